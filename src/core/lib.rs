@@ -1,0 +1,27 @@
+//! The headless core of flqr, one module for each station of the loop
+//! model → controller → robot → recording → identified model → better controller.
+//!
+//! | module | station |
+//! |---|---|
+//! | [`robot`] | the wheel-legged robot's parameters and dynamics |
+//! | [`lqr`] | Riccati equation and LQR design |
+//! | [`friction`] | Stribeck curve and its feedforward |
+//! | `control` | one pure step from measurements to motor torques |
+//! | `simulate` | plant with sticking friction, sensors, scenarios |
+//! | `record` | logs: schema, reading, writing, health |
+//! | `identify` | friction and inertia from logs |
+//! | `model_file` | models on disk (TOML) |
+//!
+//! # Invariants
+//! - SI units and radians everywhere; a name carries its unit where it has one.
+//! - No clock, no file, no thread, no printing: time and randomness are arguments, readers take
+//!   `BufRead`, writers `Write`.
+//! - Same inputs and seed, same bytes out.
+//! - Nothing here knows the window.
+
+pub mod friction;
+pub mod lqr;
+mod parameter;
+pub mod robot;
+
+pub use parameter::ParameterError;
