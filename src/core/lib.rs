@@ -10,7 +10,7 @@
 //! | `simulate` | plant with sticking friction, sensors, scenarios |
 //! | `record` | logs: schema, reading, writing, health |
 //! | `identify` | friction and inertia from logs |
-//! | `model_file` | models on disk (TOML) |
+//! | [`model_file`] | models on disk (TOML) |
 //!
 //! # Invariants
 //! - SI units and radians everywhere; a name carries its unit where it has one.
@@ -21,6 +21,7 @@
 
 pub mod friction;
 pub mod lqr;
+pub mod model_file;
 mod parameter;
 pub mod robot;
 

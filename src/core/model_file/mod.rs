@@ -1,0 +1,241 @@
+//! Models on disk: TOML in, checked model out, and back.
+//!
+//! A file describes a wheel-legged robot (`[robot]`) or a single motor or axis (`[axis]`). Every error
+//! names the file, the line, the key and the mend; an unknown key is an error, because a misspelt key that
+//! is silently dropped would leave a default in its place.
+
+mod schema;
+
+use crate::friction::{Compensation, Stribeck};
+use crate::lqr::Weights;
+use crate::robot::RobotParameters;
+use schema::{AxisFile, Refusal, RobotFile};
+
+/// A loaded model.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Model {
+    /// Name for people.
+    pub name: String,
+    /// What is modelled.
+    pub rig: Rig,
+}
+
+/// What a model describes.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Rig {
+    /// A wheel-legged robot.
+    Robot(Box<RobotModel>),
+    /// A single motor or linear axis.
+    Axis(AxisModel),
+}
+
+/// A robot with the friction of its motors and the settings of its controller.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RobotModel {
+    /// Masses, lengths and inertias.
+    pub parameters: RobotParameters,
+    /// Friction of the left and the right motor; none where the file has no table.
+    pub friction: [Option<Stribeck>; 2],
+    /// Weights of the cost, if the file has them.
+    pub weights: Option<Weights>,
+    /// Friction feedforward, if the file has it.
+    pub compensation: Option<Compensation>,
+    /// Largest torque of one motor, N m; unlimited where the file gives none.
+    pub torque_limit_nm: Option<f64>,
+}
+
+/// A single axis on a bench.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum AxisModel {
+    /// A motor shaft.
+    Rotary {
+        /// Inertia about the shaft, kg m².
+        inertia_kg_m2: f64,
+        /// Load = this × sin(angle), angle 0 hanging down, N m; 0 for a balanced shaft.
+        gravity_torque_nm: f64,
+        /// Friction on the shaft.
+        friction: Option<Stribeck>,
+    },
+    /// A carriage.
+    Linear {
+        /// Moved mass, kg.
+        mass_kg: f64,
+        /// Friction; its fields hold N, N s/m and m/s in place of N m, N m s/rad and rad/s.
+        friction: Option<Stribeck>,
+    },
+}
+
+/// Why a model file could not be loaded.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{file}:{line}: {problem}")]
+pub struct ModelFileError {
+    /// The file as the user named it.
+    pub file: String,
+    /// Line, from 1.
+    pub line: usize,
+    /// What is wrong and how it is mended.
+    pub problem: String,
+}
+
+impl Model {
+    /// Loads a model from the text of a file; `file` is only for messages.
+    ///
+    /// # Errors
+    /// Text that is not TOML, a missing or unknown key, a value of the wrong type or out of range.
+    pub fn from_toml(text: &str, file: &str) -> Result<Self, ModelFileError> {
+        let error = |line, problem: String| ModelFileError { file: file.to_owned(), line, problem };
+        let unread = |e: toml::de::Error| {
+            error(e.span().map_or(1, |span| line_at(text, span.start)), one_line(e.message()))
+        };
+        let document = toml::de::DeTable::parse(text).map_err(unread)?;
+        let has = |table: &str| document.get_ref().contains_key(table);
+        let model = match (has("robot"), has("axis")) {
+            (true, false) => toml::from_str::<RobotFile>(text).map_err(unread)?.into_model(),
+            (false, true) => toml::from_str::<AxisFile>(text).map_err(unread)?.into_model(),
+            (true, true) => Err(Refusal::new(
+                &["axis"],
+                "a model describes either a [robot] or an [axis]: remove one table",
+            )),
+            (false, false) => Err(Refusal::new(
+                &[],
+                "a model needs a [robot] table, or an [axis] table for a single motor or carriage: add one",
+            )),
+        };
+        model.map_err(|refusal| error(line_of(text, document.get_ref(), &refusal.path), refusal.problem))
+    }
+
+    /// The model as TOML that [`Model::from_toml`] reads back to an equal model.
+    pub fn to_toml(&self) -> String {
+        let text = match &self.rig {
+            Rig::Robot(robot) => toml::to_string(&RobotFile::from_model(&self.name, robot)),
+            Rig::Axis(axis) => toml::to_string(&AxisFile::from_model(&self.name, axis)),
+        };
+        text.expect("plain numbers and strings always have a TOML form")
+    }
+
+    /// The robot, where the model is one.
+    pub fn robot(&self) -> Option<&RobotModel> {
+        match &self.rig {
+            Rig::Robot(robot) => Some(robot),
+            Rig::Axis(_) => None,
+        }
+    }
+}
+
+fn one_line(message: &str) -> String {
+    message.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+fn line_at(text: &str, byte: usize) -> usize {
+    1 + text.as_bytes().iter().take(byte).filter(|&&b| b == b'\n').count()
+}
+
+/// Line of the deepest key of `path` that the document has; 1 where it has none.
+fn line_of(text: &str, document: &toml::de::DeTable<'_>, path: &[&str]) -> usize {
+    let mut table = document;
+    let mut start = 0;
+    for key in path {
+        let Some((name, value)) = table.get_key_value(*key) else { break };
+        start = name.span().start;
+        let Some(inner) = value.get_ref().as_table() else { break };
+        table = inner;
+    }
+    line_at(text, start)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ROBOT: &str = r#"name = "test"
+[robot]
+body_mass_kg = 13.0
+wheel_mass_kg = 1.0
+wheel_inertia_kg_m2 = 0.005
+wheel_radius_m = 0.1
+com_height_m = 0.25
+body_inertia_kg_m2 = 0.25
+[friction.left]
+coulomb_nm = 0.0338
+static_nm = 0.0761
+viscous_nm_s_rad = 0.00049
+stribeck_speed_rad_s = 1.612
+stribeck_exponent = 0.231
+offset_nm = -0.0016
+[lqr]
+q_diagonal = [60.0, 30.0, 100.0, 5.0]
+r_diagonal = [20.0, 20.0]
+"#;
+
+    const RAIL: &str = r#"name = "rail"
+[axis]
+kind = "linear"
+mass_kg = 95.0
+[friction]
+coulomb_n = 20.4
+viscous_n_s_m = 203.5
+offset_n = -3.2
+"#;
+
+    #[test]
+    fn robot_and_axis_survive_the_round_trip() {
+        let full = ROBOT.replace(
+            "q_diagonal = [60.0, 30.0, 100.0, 5.0]",
+            "q = [[60.0,1.0,0.0,0.0],[1.0,30.0,0.0,0.0],[0.0,0.0,100.0,0.0],[0.0,0.0,0.0,5.0]]",
+        );
+        for text in [ROBOT, RAIL, &full] {
+            let model = Model::from_toml(text, "m.toml").unwrap();
+            assert_eq!(Model::from_toml(&model.to_toml(), "again").unwrap(), model, "{}", model.to_toml());
+        }
+    }
+
+    #[test]
+    fn values_arrive_where_they_belong() {
+        let model = Model::from_toml(ROBOT, "m.toml").unwrap();
+        let robot = model.robot().unwrap();
+        assert_eq!(robot.parameters.gravity_m_s2, 9.81);
+        assert_eq!(robot.friction[0].unwrap().parameters().static_nm, 0.0761);
+        assert_eq!(robot.friction[1], None);
+        assert_eq!(robot.weights.unwrap(), Weights::diagonal([60.0, 30.0, 100.0, 5.0], [20.0, 20.0]));
+        let Rig::Axis(AxisModel::Linear { mass_kg, friction }) = Model::from_toml(RAIL, "r").unwrap().rig
+        else {
+            panic!("a linear axis was read as something else");
+        };
+        // Without the Stribeck keys the curve is plain Coulomb friction at every speed.
+        assert_eq!((mass_kg, friction.unwrap().level_nm(0.01)), (95.0, 20.4));
+    }
+
+    #[test]
+    fn each_mistake_is_named_with_its_line() {
+        for (text, line, part) in [
+            (ROBOT.replace("com_height_m", "com_hight_m"), 7, "unknown field `com_hight_m`"),
+            (
+                ROBOT.replace("body_mass_kg = 13.0", "body_mass_kg = -13.0"),
+                3,
+                "body_mass_kg = -13 is out of range",
+            ),
+            (ROBOT.replace("static_nm = 0.0761", "static_nm = nan"), 11, "static_nm = NaN is out of range"),
+            (ROBOT.replace("wheel_radius_m = 0.1\n", ""), 2, "missing field `wheel_radius_m`"),
+            (ROBOT.replace("13.0", "\"heavy\""), 3, "expected f64"),
+            (ROBOT.replace("[lqr]", "[lqr]\nr = [[1.0, 0.0], [0.0, 1.0]]"), 17, "remove one"),
+            (ROBOT.replace("r_diagonal = [20.0, 20.0]", ""), 16, "r_diagonal"),
+            (ROBOT.replace("r_diagonal = [20.0, 20.0]", "r_diagonal = [20.0]"), 18, "length"),
+            (ROBOT.replace("[lqr]", "[lqr"), 16, ""),
+            ("name = \"x\"\n".to_owned(), 1, "[robot]"),
+            (
+                ROBOT.replace("[friction.left]", "[axis]\nkind = \"linear\"\nmass_kg = 1.0\n[friction.left]"),
+                9,
+                "either",
+            ),
+            (RAIL.replace("coulomb_n ", "coulomb_nm "), 6, "coulomb_nm"),
+            (RAIL.replace("coulomb_n = 20.4", "static_n = 20.4"), 5, "coulomb_n"),
+        ] {
+            let error = Model::from_toml(&text, "m.toml").unwrap_err();
+            assert!(
+                error.line == line && error.problem.contains(part),
+                "{error} (expected line {line}, {part})"
+            );
+            assert!(!error.to_string().contains('\n'), "{error}");
+        }
+    }
+}

@@ -1,0 +1,290 @@
+//! The tables of a model file as TOML has them, and their checks.
+
+use nalgebra::{Matrix2, Matrix4};
+use serde::{Deserialize, Serialize};
+
+use super::{AxisModel, Model, Rig, RobotModel};
+use crate::friction::{Compensation, Stribeck, StribeckParameters};
+use crate::lqr::Weights;
+use crate::parameter::{ParameterError, finite, positive};
+use crate::robot::RobotParameters;
+
+/// A value that parsed and is refused.
+pub(super) struct Refusal {
+    /// Tables and key, outermost first.
+    pub(super) path: Vec<&'static str>,
+    pub(super) problem: String,
+}
+
+impl Refusal {
+    pub(super) fn new(path: &[&'static str], problem: impl Into<String>) -> Self {
+        Self { path: path.to_vec(), problem: problem.into() }
+    }
+
+    fn parameter<'a>(table: &'a [&'static str]) -> impl Fn(ParameterError) -> Self + 'a {
+        move |error| Self::new(&[table, &[error.name]].concat(), error.to_string())
+    }
+}
+
+#[derive(Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RobotFile {
+    name: String,
+    robot: RobotParameters,
+    #[serde(default)]
+    friction: MotorFrictionTable,
+    lqr: Option<LqrTable>,
+    compensation: Option<Compensation>,
+    limits: Option<LimitsTable>,
+}
+
+#[derive(Default, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+struct MotorFrictionTable {
+    left: Option<StribeckParameters>,
+    right: Option<StribeckParameters>,
+}
+
+#[derive(Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+struct LimitsTable {
+    torque_nm: f64,
+}
+
+#[derive(Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+struct LqrTable {
+    q_diagonal: Option<[f64; 4]>,
+    r_diagonal: Option<[f64; 2]>,
+    q: Option<[[f64; 4]; 4]>,
+    r: Option<[[f64; 2]; 2]>,
+}
+
+impl RobotFile {
+    pub(super) fn into_model(self) -> Result<Model, Refusal> {
+        self.robot.validate().map_err(Refusal::parameter(&["robot"]))?;
+        let curve = |parameters: Option<StribeckParameters>, table: &[&'static str]| {
+            parameters.map(Stribeck::new).transpose().map_err(Refusal::parameter(table))
+        };
+        let friction = [
+            curve(self.friction.left, &["friction", "left"])?,
+            curve(self.friction.right, &["friction", "right"])?,
+        ];
+        if let Some(compensation) = &self.compensation {
+            compensation.validate().map_err(Refusal::parameter(&["compensation"]))?;
+        }
+        if let Some(limits) = &self.limits {
+            positive("torque_nm", limits.torque_nm).map_err(Refusal::parameter(&["limits"]))?;
+        }
+        let robot = RobotModel {
+            parameters: self.robot,
+            friction,
+            weights: self.lqr.map(LqrTable::into_weights).transpose()?,
+            compensation: self.compensation,
+            torque_limit_nm: self.limits.map(|limits| limits.torque_nm),
+        };
+        Ok(Model { name: self.name, rig: Rig::Robot(Box::new(robot)) })
+    }
+
+    pub(super) fn from_model(name: &str, model: &RobotModel) -> Self {
+        let [left, right] = model.friction.map(|curve| curve.map(|curve| *curve.parameters()));
+        Self {
+            name: name.to_owned(),
+            robot: model.parameters,
+            friction: MotorFrictionTable { left, right },
+            lqr: model.weights.as_ref().map(LqrTable::from_weights),
+            compensation: model.compensation,
+            limits: model.torque_limit_nm.map(|torque_nm| LimitsTable { torque_nm }),
+        }
+    }
+}
+
+impl LqrTable {
+    fn into_weights(self) -> Result<Weights, Refusal> {
+        let q = match (self.q_diagonal, self.q) {
+            (Some(diagonal), None) => Matrix4::from_diagonal(&diagonal.into()),
+            (None, Some(rows)) => Matrix4::from_fn(|i, j| rows[i][j]),
+            (Some(_), Some(_)) => return Err(Refusal::both("q_diagonal", "q")),
+            (None, None) => return Err(Refusal::neither("q_diagonal", "q")),
+        };
+        let r = match (self.r_diagonal, self.r) {
+            (Some(diagonal), None) => Matrix2::from_diagonal(&diagonal.into()),
+            (None, Some(rows)) => Matrix2::from_fn(|i, j| rows[i][j]),
+            (Some(_), Some(_)) => return Err(Refusal::both("r_diagonal", "r")),
+            (None, None) => return Err(Refusal::neither("r_diagonal", "r")),
+        };
+        Ok(Weights { q, r })
+    }
+
+    fn from_weights(weights: &Weights) -> Self {
+        if weights.is_diagonal() {
+            Self {
+                q_diagonal: Some(weights.q.diagonal().into()),
+                r_diagonal: Some(weights.r.diagonal().into()),
+                q: None,
+                r: None,
+            }
+        } else {
+            let q = std::array::from_fn(|i| std::array::from_fn(|j| weights.q[(i, j)]));
+            let r = std::array::from_fn(|i| std::array::from_fn(|j| weights.r[(i, j)]));
+            Self { q_diagonal: None, r_diagonal: None, q: Some(q), r: Some(r) }
+        }
+    }
+}
+
+impl Refusal {
+    fn both(diagonal: &'static str, full: &'static str) -> Self {
+        Self::new(&["lqr", full], format!("{diagonal} and {full} both give the same weights: remove one"))
+    }
+
+    fn neither(diagonal: &'static str, full: &'static str) -> Self {
+        Self::new(&["lqr"], format!("[lqr] needs {diagonal}, or the full matrix {full}: add one"))
+    }
+}
+
+#[derive(Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct AxisFile {
+    name: String,
+    axis: AxisTable,
+    friction: Option<AxisFrictionTable>,
+}
+
+#[derive(Deserialize, Serialize)]
+#[serde(deny_unknown_fields, rename_all = "lowercase", tag = "kind")]
+enum AxisTable {
+    Rotary {
+        inertia_kg_m2: f64,
+        #[serde(default)]
+        gravity_torque_nm: f64,
+    },
+    Linear {
+        mass_kg: f64,
+    },
+}
+
+/// Friction keys of both kinds of axis; those of the other kind are refused.
+#[derive(Default, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+struct AxisFrictionTable {
+    coulomb_nm: Option<f64>,
+    static_nm: Option<f64>,
+    viscous_nm_s_rad: Option<f64>,
+    stribeck_speed_rad_s: Option<f64>,
+    offset_nm: Option<f64>,
+    coulomb_n: Option<f64>,
+    static_n: Option<f64>,
+    viscous_n_s_m: Option<f64>,
+    stribeck_speed_m_s: Option<f64>,
+    offset_n: Option<f64>,
+    stribeck_exponent: Option<f64>,
+}
+
+/// One kind's keys and values in the order Coulomb, viscous, offset, static, Stribeck speed.
+type AxisKeys = [(&'static str, Option<f64>); 5];
+
+impl AxisFrictionTable {
+    fn rotary(&self) -> AxisKeys {
+        [
+            ("coulomb_nm", self.coulomb_nm),
+            ("viscous_nm_s_rad", self.viscous_nm_s_rad),
+            ("offset_nm", self.offset_nm),
+            ("static_nm", self.static_nm),
+            ("stribeck_speed_rad_s", self.stribeck_speed_rad_s),
+        ]
+    }
+
+    fn linear(&self) -> AxisKeys {
+        [
+            ("coulomb_n", self.coulomb_n),
+            ("viscous_n_s_m", self.viscous_n_s_m),
+            ("offset_n", self.offset_n),
+            ("static_n", self.static_n),
+            ("stribeck_speed_m_s", self.stribeck_speed_m_s),
+        ]
+    }
+
+    /// A missing Stribeck part means plain Coulomb friction: static level equal to the Coulomb level.
+    fn curve(&self, own: AxisKeys, other: AxisKeys) -> Result<Stribeck, Refusal> {
+        if let Some((key, _)) = other.iter().find(|(_, value)| value.is_some()) {
+            let problem =
+                format!("{key} has the unit of the other kind of axis: use {}", own.map(|k| k.0).join(", "));
+            return Err(Refusal::new(&["friction", key], problem));
+        }
+        let needed = |(key, value): (&'static str, Option<f64>)| {
+            value.ok_or_else(|| Refusal::new(&["friction"], format!("[friction] lacks {key}: add it")))
+        };
+        let coulomb_nm = needed(own[0])?;
+        let parameters = StribeckParameters {
+            coulomb_nm,
+            viscous_nm_s_rad: needed(own[1])?,
+            offset_nm: own[2].1.unwrap_or(0.0),
+            static_nm: own[3].1.unwrap_or(coulomb_nm),
+            stribeck_speed_rad_s: own[4].1.unwrap_or(1.0),
+            stribeck_exponent: self.stribeck_exponent.unwrap_or(1.0),
+        };
+        Stribeck::new(parameters).map_err(|error| {
+            let rotary = ["coulomb_nm", "viscous_nm_s_rad", "offset_nm", "static_nm", "stribeck_speed_rad_s"];
+            let name = rotary.iter().position(|&key| key == error.name).map_or(error.name, |i| own[i].0);
+            Refusal::parameter(&["friction"])(ParameterError { name, ..error })
+        })
+    }
+}
+
+impl AxisFile {
+    pub(super) fn into_model(self) -> Result<Model, Refusal> {
+        let friction = self.friction.as_ref();
+        let axis = match self.axis {
+            AxisTable::Rotary { inertia_kg_m2, gravity_torque_nm } => {
+                positive("inertia_kg_m2", inertia_kg_m2).map_err(Refusal::parameter(&["axis"]))?;
+                finite("gravity_torque_nm", gravity_torque_nm).map_err(Refusal::parameter(&["axis"]))?;
+                let friction =
+                    friction.map(|table| table.curve(table.rotary(), table.linear())).transpose()?;
+                AxisModel::Rotary { inertia_kg_m2, gravity_torque_nm, friction }
+            }
+            AxisTable::Linear { mass_kg } => {
+                positive("mass_kg", mass_kg).map_err(Refusal::parameter(&["axis"]))?;
+                let friction =
+                    friction.map(|table| table.curve(table.linear(), table.rotary())).transpose()?;
+                AxisModel::Linear { mass_kg, friction }
+            }
+        };
+        Ok(Model { name: self.name, rig: Rig::Axis(axis) })
+    }
+
+    pub(super) fn from_model(name: &str, model: &AxisModel) -> Self {
+        let (axis, friction) = match *model {
+            AxisModel::Rotary { inertia_kg_m2, gravity_torque_nm, friction } => {
+                let table = friction.map(|curve| {
+                    let p = curve.parameters();
+                    AxisFrictionTable {
+                        coulomb_nm: Some(p.coulomb_nm),
+                        static_nm: Some(p.static_nm),
+                        viscous_nm_s_rad: Some(p.viscous_nm_s_rad),
+                        stribeck_speed_rad_s: Some(p.stribeck_speed_rad_s),
+                        stribeck_exponent: Some(p.stribeck_exponent),
+                        offset_nm: Some(p.offset_nm),
+                        ..AxisFrictionTable::default()
+                    }
+                });
+                (AxisTable::Rotary { inertia_kg_m2, gravity_torque_nm }, table)
+            }
+            AxisModel::Linear { mass_kg, friction } => {
+                let table = friction.map(|curve| {
+                    let p = curve.parameters();
+                    AxisFrictionTable {
+                        coulomb_n: Some(p.coulomb_nm),
+                        static_n: Some(p.static_nm),
+                        viscous_n_s_m: Some(p.viscous_nm_s_rad),
+                        stribeck_speed_m_s: Some(p.stribeck_speed_rad_s),
+                        stribeck_exponent: Some(p.stribeck_exponent),
+                        offset_n: Some(p.offset_nm),
+                        ..AxisFrictionTable::default()
+                    }
+                });
+                (AxisTable::Linear { mass_kg }, table)
+            }
+        };
+        Self { name: name.to_owned(), axis, friction }
+    }
+}
