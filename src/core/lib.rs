@@ -8,7 +8,7 @@
 //! | [`friction`] | Stribeck curve and its feedforward |
 //! | `control` | one pure step from measurements to motor torques |
 //! | `simulate` | plant with sticking friction, sensors, scenarios |
-//! | `record` | logs: schema, reading, writing, health |
+//! | [`record`] | logs: schema, reading, writing, health |
 //! | `identify` | friction and inertia from logs |
 //! | [`model_file`] | models on disk (TOML) |
 //!
@@ -23,6 +23,7 @@ pub mod friction;
 pub mod lqr;
 pub mod model_file;
 mod parameter;
+pub mod record;
 pub mod robot;
 
 pub use parameter::ParameterError;

@@ -1,0 +1,145 @@
+//! Logs: schema, reading, writing and health.
+//!
+//! A log is CSV with a header. Columns may come in any order; the unit is the ending of a column's name
+//! ([`schema`] lists the names), other columns are kept and ignored. `#` starts a comment line. Where the
+//! header has no comma, semicolons or tabs separate the cells.
+//!
+//! What happens with damaged input ([`read_log`]):
+//! - A row with too few or too many cells, or with a cell that is not a finite number in a required column,
+//!   is dropped; [`Log::problems`] names line and column. Consumers may rely on required columns being finite.
+//! - The same in an optional column of the schema leaves the row, with NaN as the value.
+//! - An empty cell of an optional column and any text in a column outside the schema is NaN without a problem.
+//! - Rows whose time does not follow are dropped, as few as possible (the longest rising sequence stays).
+//! - A log in which every second row would be dropped, or time fails in more than one row of a hundred, is
+//!   refused. A repeated header (recordings appended to one another) is such a dropped row.
+
+mod error;
+mod health;
+mod map;
+mod plan;
+mod read;
+pub mod schema;
+mod table;
+mod text;
+mod time;
+mod write;
+
+pub use error::{LineProblem, LogError};
+pub use health::{HealthFinding, Severity, data_health};
+pub use map::{ColumnMap, MapError, Mapping};
+pub use read::{ReadOptions, ReadProgress, read_log};
+pub use schema::LogKind;
+pub use write::write_log;
+
+/// One column of a log.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Column {
+    /// Name with unit, such as `torque_nm`.
+    pub name: String,
+    /// One value for each row; NaN where there is none.
+    pub values: Vec<f64>,
+}
+
+/// A log in memory; every column has the same number of rows.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Log {
+    /// The name that the user gave it, for messages.
+    pub source: String,
+    /// The file's columns in its order, then the mapped ones.
+    pub columns: Vec<Column>,
+    /// Rows of the file that were dropped.
+    pub dropped_rows: usize,
+    /// The first problems, at most [`Log::KEPT_PROBLEMS`].
+    pub problems: Vec<LineProblem>,
+    /// All problems, those beyond the kept ones included.
+    pub problem_count: usize,
+}
+
+impl Log {
+    /// How many problems are kept with line and column.
+    pub const KEPT_PROBLEMS: usize = 100;
+
+    /// A log of these columns; shorter ones are filled up with NaN.
+    pub fn from_columns<N: Into<String>>(
+        source: impl Into<String>,
+        columns: impl IntoIterator<Item = (N, Vec<f64>)>,
+    ) -> Self {
+        let mut columns: Vec<Column> =
+            columns.into_iter().map(|(name, values)| Column { name: name.into(), values }).collect();
+        let rows = columns.iter().map(|column| column.values.len()).max().unwrap_or(0);
+        columns.iter_mut().for_each(|column| column.values.resize(rows, f64::NAN));
+        Self { source: source.into(), columns, ..Self::default() }
+    }
+
+    /// The values of a column; the first one of that name.
+    pub fn column(&self, name: &str) -> Option<&[f64]> {
+        self.columns.iter().find(|column| column.name == name).map(|column| column.values.as_slice())
+    }
+
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.columns.first().map_or(0, |column| column.values.len())
+    }
+
+    /// Whether the columns are complete for a kind. A log may serve several kinds: a model then says which.
+    pub fn serves(&self, kind: LogKind) -> bool {
+        kind.fits(|name| self.column(name).is_some())
+    }
+
+    /// What the log records, from its columns: the first of [`LogKind::ALL`] that is complete.
+    ///
+    /// # Errors
+    /// [`LogError::MissingColumns`] for the kind that the columns come nearest to.
+    pub fn kind(&self) -> Result<LogKind, LogError> {
+        LogKind::recognise(|name| self.column(name).is_some())
+            .ok_or_else(|| self.missing_for(LogKind::nearest(|name| self.column(name).is_some())))
+    }
+
+    /// A required column of a kind of log.
+    ///
+    /// # Errors
+    /// [`LogError::MissingColumns`].
+    pub fn required(&self, kind: LogKind, name: &str) -> Result<&[f64], LogError> {
+        self.column(name).ok_or_else(|| self.missing_for(kind))
+    }
+
+    /// The error that says which columns of a kind are missing.
+    pub fn missing_for(&self, kind: LogKind) -> LogError {
+        let missing: Vec<&str> =
+            kind.required().iter().copied().filter(|name| self.column(name).is_none()).collect();
+        let names: Vec<&str> = self.columns.iter().map(|column| column.name.as_str()).collect();
+        LogError::MissingColumns {
+            file: self.source.clone(),
+            kind,
+            missing: missing.join("`, `"),
+            present: listed(&names),
+            example: map_example(missing.first().copied().unwrap_or("torque_nm"), &names),
+        }
+    }
+}
+
+/// Names in backquotes, the first twenty.
+fn listed(names: &[&str]) -> String {
+    const SHOWN: usize = 20;
+    let mut text = names.iter().take(SHOWN).map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
+    if names.len() > SHOWN {
+        text += &format!(" and {} more", names.len() - SHOWN);
+    }
+    text
+}
+
+/// A column map entry with the file's column that shares most words with a missing one.
+fn map_example(missing: &str, present: &[&str]) -> String {
+    let words = |name: &str| {
+        name.to_lowercase().split(|c: char| !c.is_alphanumeric()).map(str::to_owned).collect::<Vec<_>>()
+    };
+    let wanted = words(missing);
+    let shared = |name: &str| words(name).iter().filter(|word| wanted.contains(word)).count();
+    let mut best = ("COLUMN", 0);
+    for &name in present.iter().filter(|name| !schema::is_known(name)) {
+        if shared(name) > best.1 {
+            best = (name, shared(name));
+        }
+    }
+    format!("{missing}={}", best.0)
+}

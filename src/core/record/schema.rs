@@ -1,0 +1,123 @@
+//! The columns that a log may have, and the kinds of logs that they make.
+
+use std::fmt;
+
+use serde::Serialize;
+
+/// What a log records, recognised from its columns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LogKind {
+    /// One motor: [`BENCH`].
+    Bench,
+    /// One linear axis: [`LINEAR_AXIS`].
+    LinearAxis,
+    /// The wheel-legged robot: [`ROBOT`].
+    Robot,
+    /// One row for each pair of speed and friction torque: [`FRICTION_PAIRS`].
+    FrictionPairs,
+}
+
+/// Required columns of a bench log.
+pub const BENCH: &[&str] = &["time_s", "motor_angle_rad", "torque_nm"];
+/// Required columns of a linear axis log.
+pub const LINEAR_AXIS: &[&str] = &["time_s", "position_m", "force_n"];
+/// Required columns of a robot log.
+pub const ROBOT: &[&str] = &[
+    "time_s",
+    "x_m",
+    "x_dot_m_s",
+    "pitch_rad",
+    "pitch_rate_rad_s",
+    "motor_angle_left_rad",
+    "motor_angle_right_rad",
+    "motor_speed_left_rad_s",
+    "motor_speed_right_rad_s",
+    "torque_left_nm",
+    "torque_right_nm",
+];
+/// Required columns of a file of friction pairs.
+pub const FRICTION_PAIRS: &[&str] = &["speed_rad_s", "torque_nm"];
+/// Columns that a log may have beside the required ones.
+pub const OPTIONAL: &[&str] = &[
+    "motor_speed_rad_s",
+    "motor_temperature_c",
+    "target_speed_rad_s",
+    "velocity_m_s",
+    "motor_temperature_left_c",
+    "motor_temperature_right_c",
+    "bus_voltage_v",
+];
+
+impl LogKind {
+    /// Every kind, in the order in which a file is tried.
+    pub const ALL: [Self; 4] = [Self::Robot, Self::Bench, Self::LinearAxis, Self::FrictionPairs];
+
+    /// The columns that a log of this kind must have.
+    pub fn required(self) -> &'static [&'static str] {
+        match self {
+            Self::Bench => BENCH,
+            Self::LinearAxis => LINEAR_AXIS,
+            Self::Robot => ROBOT,
+            Self::FrictionPairs => FRICTION_PAIRS,
+        }
+    }
+
+    /// Whether a file with these columns can be read as this kind.
+    ///
+    /// Rows with a time stamp are samples of a motion, so `speed_rad_s` and `torque_nm` beside `time_s`
+    /// are not friction pairs.
+    pub fn fits(self, has: impl Fn(&str) -> bool) -> bool {
+        self.required().iter().all(|name| has(name)) && !(self == Self::FrictionPairs && has("time_s"))
+    }
+
+    /// The kind of a file with these columns, if they are complete for one.
+    pub fn recognise(has: impl Fn(&str) -> bool) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.fits(&has))
+    }
+
+    /// The kind that a file with these columns most probably was meant to be: the largest share of
+    /// required columns, the kind with fewer columns first. Time alone says nothing.
+    pub(crate) fn nearest(has: impl Fn(&str) -> bool) -> Self {
+        let share = |kind: Self| {
+            let required = kind.required().iter().filter(|&&name| name != "time_s");
+            let present = required.clone().filter(|name| has(name)).count();
+            present * 100 / required.count()
+        };
+        let mut nearest = Self::Bench;
+        for kind in [Self::LinearAxis, Self::Robot] {
+            if share(kind) > share(nearest) {
+                nearest = kind;
+            }
+        }
+        nearest
+    }
+}
+
+impl fmt::Display for LogKind {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(match self {
+            Self::Bench => "bench log",
+            Self::LinearAxis => "linear axis log",
+            Self::Robot => "robot log",
+            Self::FrictionPairs => "file of friction pairs",
+        })
+    }
+}
+
+/// Whether a name is one of the schema.
+pub fn is_known(name: &str) -> bool {
+    known().any(|known| known == name)
+}
+
+/// Every name of the schema, each once.
+pub fn known() -> impl Iterator<Item = &'static str> {
+    let later = |names: &'static [&'static str]| names.iter().copied().filter(|&name| name != "time_s");
+    ROBOT
+        .iter()
+        .copied()
+        .chain(later(BENCH))
+        .chain(later(LINEAR_AXIS))
+        .chain(["speed_rad_s"])
+        .chain(OPTIONAL.iter().copied())
+}
