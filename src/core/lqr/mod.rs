@@ -1,5 +1,23 @@
 //! LQR design: weights, Riccati equation, gain, cost, poles and residual.
 
+mod balance;
+mod care;
+#[cfg(test)]
+mod carex;
+mod checks;
+mod diagnosis;
+mod double_double;
+mod doubling;
+mod error;
+mod input;
+mod newton;
+mod poles;
+mod real;
+mod search;
+mod sign;
+mod square;
 mod weights;
 
+pub use care::{CareInput, CareSolution, solve_care};
+pub use error::CareError;
 pub use weights::Weights;

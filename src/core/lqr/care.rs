@@ -1,0 +1,116 @@
+//! The continuous algebraic Riccati equation for any number of states and inputs.
+
+use nalgebra::{Complex, DMatrix};
+
+use super::balance::{scaled, units};
+use super::checks::{check_finite, check_shape, check_symmetric};
+use super::diagnosis::cause;
+use super::double_double::DoubleDouble;
+use super::doubling::Riccati;
+use super::error::CareError;
+use super::input::{Input, from_dmatrix};
+use super::real::Real;
+use super::search::find;
+use super::square::{Square, SquareN};
+
+/// How the quadratic term of the equation is given.
+#[derive(Clone, Copy, Debug)]
+pub enum CareInput<'a> {
+    /// G = B R⁻¹ Bᵀ, formed in twice the precision of a double, so that R may be nearly singular.
+    Weighted {
+        /// B, n×m.
+        b: &'a DMatrix<f64>,
+        /// R, m×m, symmetric positive definite.
+        r: &'a DMatrix<f64>,
+    },
+    /// G itself.
+    Quadratic {
+        /// G, n×n, symmetric.
+        g: &'a DMatrix<f64>,
+    },
+}
+
+/// The stabilising solution of a Riccati equation.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CareSolution {
+    /// P, n×n, symmetric.
+    pub p: DMatrix<f64>,
+    /// K = R⁻¹BᵀP, m×n, of u = −K x; absent where G was given.
+    pub gain: Option<DMatrix<f64>>,
+    /// Eigenvalues of A − GP, n of them, conjugates next to each other.
+    pub poles: Vec<Complex<f64>>,
+    /// ‖AᵀP + PA − PGP + Q‖_F / ‖P‖_F of the returned P (of ‖Q‖_F alone where P = 0), itself evaluated in
+    /// twice the precision of a double.
+    pub relative_residual: f64,
+    /// What to know before P is used: poles on the imaginary axis, digits lost to bad condition.
+    pub warnings: Vec<String>,
+}
+
+/// Solves AᵀP + PA − PGP + Q = 0 (Eq. 25) for the symmetric P that makes A − GP stable, G = B R⁻¹ Bᵀ; the
+/// control is u = −K x with K = R⁻¹BᵀP (Eq. 24).
+///
+/// A and Q are n×n, B n×m, R m×m, for any n ≥ 1 and m. Q is symmetric, of any definiteness; R symmetric
+/// positive definite; symmetric means to 1e-12 of the largest entry, and the mean of both halves is taken.
+///
+/// P is the exact solution for the doubles given, rounded to double, as far as the condition of the
+/// equation lets 32 digits reach; a warning says where fewer than nine are left. Poles on the imaginary
+/// axis, where P is the limit of stabilising solutions, are a warning too.
+///
+/// # Errors
+/// Matrices of wrong shape, not finite, not symmetric; R not positive definite; [`CareError::NotStabilisable`],
+/// [`CareError::NotDetectable`] or [`CareError::NoSolution`] where no stabilising P is found. That follows
+/// from the outcome (no finite P, a residual that stays, poles in the right half-plane); tests of rank only
+/// name the cause.
+///
+/// # Method
+/// Balancing by powers of two; structure-preserving doubling; Newton's method with residuals in
+/// double-double until the corrections are below the rounding of the result. Where that does not contract,
+/// the doubling is repeated in double-double; where Q does not see an unstable mode, the matrix sign function
+/// takes its place. References are at each of these modules' heads.
+///
+/// ```
+/// use flqr_core::lqr::{CareInput, solve_care};
+/// use nalgebra::dmatrix;
+///
+/// let (a, b) = (dmatrix![0.0, 1.0; 0.0, 0.0], dmatrix![0.0; 1.0]);
+/// let (q, r) = (dmatrix![1.0, 0.0; 0.0, 2.0], dmatrix![1.0]);
+/// let solution = solve_care(&a, &q, CareInput::Weighted { b: &b, r: &r })?;
+/// assert_eq!(solution.p, dmatrix![2.0, 1.0; 1.0, 2.0]); // Laub 1979, example 1
+/// # Ok::<(), flqr_core::lqr::CareError>(())
+/// ```
+pub fn solve_care(a: &DMatrix<f64>, q: &DMatrix<f64>, input: CareInput) -> Result<CareSolution, CareError> {
+    let n = a.nrows();
+    if n == 0 {
+        return Err(CareError::NoStates);
+    }
+    for (name, matrix) in [("a", a), ("q", q)] {
+        check_shape(name, matrix, [n, n])?;
+        check_finite(name, matrix)?;
+    }
+    check_symmetric("q", q)?;
+    let input = Input::new(n, input)?;
+    let equation = Riccati { a: from_dmatrix(a), g: input.g, q: from_dmatrix(q).symmetric_part() };
+    let units = units(&equation);
+    let balanced = equation.in_units(&units);
+    let Some(found) = find(&balanced) else {
+        return Err(cause(&balanced));
+    };
+    let exact = scaled(&found.p, |i, j| 1.0 / (units[i] * units[j]));
+    let p = exact.map(Real::to_f64);
+    if !p.norm().is_finite() {
+        return Err(CareError::OutOfRange);
+    }
+    let rounded: SquareN<DoubleDouble> = p.map(Real::from_f64);
+    Ok(CareSolution {
+        gain: input.weighted.map(|weighted| weighted.gain(&exact)),
+        poles: found.poles,
+        relative_residual: relative(equation.residual(&rounded).norm(), p.norm()),
+        warnings: found.warnings,
+        p: DMatrix::from_row_slice(n, n, p.entries()),
+    })
+}
+
+/// `residual` over `size`, or as it is where P is zero.
+fn relative(residual: f64, size: f64) -> f64 {
+    if size > 0.0 { residual / size } else { residual }
+}

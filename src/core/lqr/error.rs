@@ -1,0 +1,62 @@
+//! Why a Riccati equation or a design was refused.
+
+use nalgebra::Complex;
+use thiserror::Error;
+
+/// Why [`solve_care`](super::solve_care) returns no P. Rows and columns count from 1.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum CareError {
+    /// A is 0×0.
+    #[error("matrix a has no rows: give at least one state")]
+    NoStates,
+    /// A matrix does not fit the others.
+    #[error(
+        "matrix {matrix} is {rows}×{columns} but must be {needed_rows}×{needed_columns} to fit the others"
+    )]
+    #[expect(missing_docs, reason = "named as what they are")]
+    Shape { matrix: &'static str, rows: usize, columns: usize, needed_rows: usize, needed_columns: usize },
+    /// An entry is NaN or infinite.
+    #[error("entry ({row}, {column}) of matrix {matrix} is {value}: it must be a finite number")]
+    #[expect(missing_docs, reason = "named as what they are")]
+    NonFinite { matrix: &'static str, row: usize, column: usize, value: f64 },
+    /// Q, R or G is not symmetric.
+    #[error(
+        "matrix {matrix} is not symmetric: entry ({row}, {column}) is {upper} but ({column}, {row}) is {lower}"
+    )]
+    #[expect(missing_docs, reason = "named as what they are")]
+    NotSymmetric { matrix: &'static str, row: usize, column: usize, upper: f64, lower: f64 },
+    /// R is singular to rounding, indefinite or negative.
+    #[error("matrix r is not positive definite: every direction of the inputs must cost something")]
+    RNotPositiveDefinite,
+    /// A mode that no input reaches does not die out.
+    #[error(
+        "not stabilisable: no input reaches the mode at {eigenvalue} of a, which does not die out by itself"
+    )]
+    NotStabilisable {
+        /// Eigenvalue of A, 1/s.
+        eigenvalue: Complex<f64>,
+    },
+    /// A mode on or right of the imaginary axis costs nothing.
+    #[error("not detectable: the mode at {eigenvalue} of a costs nothing, so give its states a weight in q")]
+    NotDetectable {
+        /// Eigenvalue of A, 1/s.
+        eigenvalue: Complex<f64>,
+    },
+    /// The Hamiltonian matrix has eigenvalues on the imaginary axis and no P bounds them.
+    #[error(
+        "no stabilising solution: the Hamiltonian matrix has an eigenvalue at {eigenvalue}, on the imaginary \
+         axis to rounding; change q"
+    )]
+    NoSolution {
+        /// The Hamiltonian's eigenvalue next to the axis, 1/s.
+        eigenvalue: Complex<f64>,
+    },
+    /// The condition leaves no digit.
+    #[error(
+        "no solution found: the equation is too ill-conditioned for 32 digits, so scale or reduce the model"
+    )]
+    IllConditioned,
+    /// P exists but does not fit a double.
+    #[error("the solution is out of the range of doubles: choose other units for the states or the cost")]
+    OutOfRange,
+}
