@@ -70,12 +70,13 @@ pub struct CareSolution {
 ///
 /// ```
 /// use flqr_core::lqr::{CareInput, solve_care};
-/// use nalgebra::dmatrix;
+/// use nalgebra::DMatrix;
 ///
-/// let (a, b) = (dmatrix![0.0, 1.0; 0.0, 0.0], dmatrix![0.0; 1.0]);
-/// let (q, r) = (dmatrix![1.0, 0.0; 0.0, 2.0], dmatrix![1.0]);
+/// let matrix = |rows, columns, entries: &[f64]| DMatrix::from_row_slice(rows, columns, entries);
+/// let (a, b) = (matrix(2, 2, &[0.0, 1.0, 0.0, 0.0]), matrix(2, 1, &[0.0, 1.0]));
+/// let (q, r) = (matrix(2, 2, &[1.0, 0.0, 0.0, 2.0]), matrix(1, 1, &[1.0]));
 /// let solution = solve_care(&a, &q, CareInput::Weighted { b: &b, r: &r })?;
-/// assert_eq!(solution.p, dmatrix![2.0, 1.0; 1.0, 2.0]); // Laub 1979, example 1
+/// assert_eq!(solution.p, matrix(2, 2, &[2.0, 1.0, 1.0, 2.0])); // Laub 1979, example 1
 /// # Ok::<(), flqr_core::lqr::CareError>(())
 /// ```
 pub fn solve_care(a: &DMatrix<f64>, q: &DMatrix<f64>, input: CareInput) -> Result<CareSolution, CareError> {

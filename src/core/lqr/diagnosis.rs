@@ -10,8 +10,8 @@ use super::real::Real;
 use super::sign::hamiltonian;
 use super::square::{Square, SquareN};
 
-/// Smallest singular value, relative to the norm, below which a mode counts as out of reach.
-const OUT_OF_REACH: f64 = 1e-7;
+/// Smallest singular value, relative to the norm of A, below which a mode counts as out of reach.
+const OUT_OF_REACH: f64 = 1e-10;
 /// Real part, relative to the norm, from which on a mode counts as not dying out.
 const NOT_DYING_OUT: f64 = -1e-7;
 /// Distance to the imaginary axis, relative to the norm, of a Hamiltonian eigenvalue that counts as on it.
@@ -60,7 +60,7 @@ pub(super) fn lost_mode(a: &DMatrix<f64>, rows: &DMatrix<f64>) -> Option<LostMod
         .into_iter()
         .filter(|mode| mode.im >= 0.0 && mode.re >= NOT_DYING_OUT * size)
         .filter_map(|eigenvalue| {
-            let test = DMatrix::from_fn(2 * n, n, |i, j| match i < n {
+            let test = DMatrix::from_fn(n + rows.nrows(), n, |i, j| match i < n {
                 true if i == j => Complex::from(a[(i, j)]) - eigenvalue,
                 true => Complex::from(a[(i, j)]),
                 false => Complex::from(rows[(i - n, j)] * row_scale),

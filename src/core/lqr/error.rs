@@ -30,22 +30,27 @@ pub enum CareError {
     RNotPositiveDefinite,
     /// A mode that no input reaches does not die out.
     #[error(
-        "not stabilisable: no input reaches the mode at {eigenvalue} of a, which does not die out by itself"
+        "not stabilisable: no input reaches the mode at {} of a, which does not die out by itself",
+        text(eigenvalue)
     )]
     NotStabilisable {
         /// Eigenvalue of A, 1/s.
         eigenvalue: Complex<f64>,
     },
     /// A mode on or right of the imaginary axis costs nothing.
-    #[error("not detectable: the mode at {eigenvalue} of a costs nothing, so give its states a weight in q")]
+    #[error(
+        "not detectable: the mode at {} of a does not die out and costs nothing: give its states a weight in q",
+        text(eigenvalue)
+    )]
     NotDetectable {
         /// Eigenvalue of A, 1/s.
         eigenvalue: Complex<f64>,
     },
     /// The Hamiltonian matrix has eigenvalues on the imaginary axis and no P bounds them.
     #[error(
-        "no stabilising solution: the Hamiltonian matrix has an eigenvalue at {eigenvalue}, on the imaginary \
-         axis to rounding; change q"
+        "no stabilising solution: the Hamiltonian matrix has an eigenvalue at {}, on the imaginary axis to \
+         rounding: change q",
+        text(eigenvalue)
     )]
     NoSolution {
         /// The Hamiltonian's eigenvalue next to the axis, 1/s.
@@ -59,4 +64,43 @@ pub enum CareError {
     /// P exists but does not fit a double.
     #[error("the solution is out of the range of doubles: choose other units for the states or the cost")]
     OutOfRange,
+}
+
+/// Why [`design`](super::design) returns no gain.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum DesignError {
+    /// The matrices are not fit for a Riccati equation, or it has no solution.
+    #[error(transparent)]
+    Equation(#[from] CareError),
+    /// Q would reward some state.
+    #[error("matrix q is not positive semidefinite: no state and no combination of states may cost less than 0")]
+    QNotPositiveSemidefinite,
+    /// A mode on or right of the imaginary axis costs nothing.
+    #[error(
+        "not detectable: the mode at {} does not die out and costs nothing: give {state} a weight above 0",
+        text(eigenvalue)
+    )]
+    NotDetectable {
+        /// Eigenvalue of A, 1/s.
+        eigenvalue: Complex<f64>,
+        /// The state that takes the largest part in the mode: x, x_dot, pitch or pitch_rate.
+        state: &'static str,
+    },
+    /// The closed loop would not come to rest.
+    #[error(
+        "the closed loop has a pole at {}, which does not die out: raise the weights in q against those in r",
+        text(pole)
+    )]
+    NotStable {
+        /// Eigenvalue of A − BK, 1/s.
+        pole: Complex<f64>,
+    },
+}
+
+/// A real eigenvalue without its imaginary zero, and zero without a sign.
+fn text(eigenvalue: &Complex<f64>) -> String {
+    match (eigenvalue.re + 0.0, eigenvalue.im) {
+        (real, 0.0) => real.to_string(),
+        _ => eigenvalue.to_string(),
+    }
 }

@@ -5,6 +5,7 @@ mod care;
 #[cfg(test)]
 mod carex;
 mod checks;
+mod design;
 mod diagnosis;
 mod double_double;
 mod doubling;
@@ -19,5 +20,6 @@ mod square;
 mod weights;
 
 pub use care::{CareInput, CareSolution, solve_care};
-pub use error::CareError;
+pub use design::{LqrDesign, design};
+pub use error::{CareError, DesignError};
 pub use weights::Weights;
