@@ -6,8 +6,8 @@
 //! | [`robot`] | the wheel-legged robot's parameters and dynamics |
 //! | [`lqr`] | Riccati equation and LQR design |
 //! | [`friction`] | Stribeck curve and its feedforward |
-//! | `control` | one pure step from measurements to motor torques |
-//! | `simulate` | plant with sticking friction, sensors, scenarios |
+//! | [`control`] | one pure step from measurements to motor torques |
+//! | [`simulate`] | plant with sticking friction, sensors, scenarios |
 //! | [`record`] | logs: schema, reading, writing, health |
 //! | `identify` | friction and inertia from logs |
 //! | [`model_file`] | models on disk (TOML) |
@@ -19,11 +19,13 @@
 //! - Same inputs and seed, same bytes out.
 //! - Nothing here knows the window.
 
+pub mod control;
 pub mod friction;
 pub mod lqr;
 pub mod model_file;
 mod parameter;
 pub mod record;
 pub mod robot;
+pub mod simulate;
 
 pub use parameter::ParameterError;

@@ -1,0 +1,114 @@
+//! LQR and FLQR (Eqs. 13, 29).
+
+use nalgebra::{Matrix2x4, Vector2};
+
+use crate::ParameterError;
+use crate::friction::{Compensation, Feedforward};
+use crate::model_file::RobotModel;
+use crate::robot::State;
+
+/// Compensation of models that give friction but no `[compensation]`: a little less than the whole curve,
+/// so that a curve that was identified 10 % too high does not drive the robot by itself, and a direction
+/// that turns over about one step of a motor speed read in 1 deg/s steps.
+pub const DEFAULT_COMPENSATION: Compensation = Compensation { ratio: 0.9, smoothing_speed_rad_s: 0.02 };
+
+/// Which controller is made from a model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ControllerKind {
+    /// u = −K X.
+    Lqr,
+    /// u = −K X + τ_f(q̇), friction fed forward per motor.
+    Flqr,
+}
+
+/// What a controller knows at one tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Measurement {
+    /// X as the robot estimates it from encoders and IMU.
+    pub state: State,
+    /// Motor speeds q̇, left and right, rad/s.
+    pub motor_speed_rad_s: [f64; 2],
+}
+
+/// State feedback with optional friction feedforward and a torque limit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BalanceController {
+    /// K, 2×4: rows left and right motor, columns N m/m, N m s/m, N m/rad, N m s/rad.
+    pub gain: Matrix2x4<f64>,
+    /// Friction feedforward of the left and the right motor; none in plain LQR and where a motor has no
+    /// known friction.
+    pub feedforward: [Option<Feedforward>; 2],
+    /// Largest torque of one motor, N m; infinite if unlimited.
+    pub torque_limit_nm: f64,
+}
+
+/// Why a controller cannot be made from a model.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ControlError {
+    /// FLQR without anything to feed forward.
+    #[error(
+        "flqr needs the friction of at least one motor: add [friction.left] and [friction.right] or use lqr"
+    )]
+    NoFriction,
+    /// A gain that is infinite or not a number.
+    #[error("gain of motor {motor}, state {state} is {value}: it must be a finite number")]
+    Gain {
+        /// `left` or `right`.
+        motor: &'static str,
+        /// `x`, `x_dot`, `pitch` or `pitch_rate`.
+        state: &'static str,
+        /// The refused gain.
+        value: f64,
+    },
+    /// A parameter of the compensation that is out of range.
+    #[error(transparent)]
+    Parameter(#[from] ParameterError),
+}
+
+impl BalanceController {
+    /// The controller of `kind` for a robot with the given gain; friction, compensation (or
+    /// [`DEFAULT_COMPENSATION`]) and torque limit come from the model.
+    pub fn new(kind: ControllerKind, robot: &RobotModel, gain: Matrix2x4<f64>) -> Result<Self, ControlError> {
+        check_gain(&gain)?;
+        let feedforward = match kind {
+            ControllerKind::Lqr => [None; 2],
+            ControllerKind::Flqr => feedforward(robot)?,
+        };
+        Ok(Self { gain, feedforward, torque_limit_nm: robot.torque_limit_nm.unwrap_or(f64::INFINITY) })
+    }
+
+    /// Torques of the left and the right motor, N m: −K X (Eq. 13) plus the feedforward at each motor's
+    /// speed (Eq. 29), within the limit.
+    pub fn step(&self, measurement: &Measurement) -> [f64; 2] {
+        let feedback: Vector2<f64> = -(self.gain * measurement.state.to_vector());
+        std::array::from_fn(|motor| {
+            let friction = self.feedforward[motor]
+                .map_or(0.0, |feedforward| feedforward.torque_nm(measurement.motor_speed_rad_s[motor]));
+            (feedback[motor] + friction).clamp(-self.torque_limit_nm, self.torque_limit_nm)
+        })
+    }
+}
+
+fn check_gain(gain: &Matrix2x4<f64>) -> Result<(), ControlError> {
+    for (row, motor) in ["left", "right"].into_iter().enumerate() {
+        for (column, state) in ["x", "x_dot", "pitch", "pitch_rate"].into_iter().enumerate() {
+            let value = gain[(row, column)];
+            if !value.is_finite() {
+                return Err(ControlError::Gain { motor, state, value });
+            }
+        }
+    }
+    Ok(())
+}
+
+fn feedforward(robot: &RobotModel) -> Result<[Option<Feedforward>; 2], ControlError> {
+    if robot.friction.iter().all(Option::is_none) {
+        return Err(ControlError::NoFriction);
+    }
+    let compensation = robot.compensation.unwrap_or(DEFAULT_COMPENSATION);
+    let mut motors = [None; 2];
+    for (motor, curve) in motors.iter_mut().zip(robot.friction) {
+        *motor = curve.map(|curve| Feedforward::new(curve, compensation)).transpose()?;
+    }
+    Ok(motors)
+}

@@ -1,0 +1,14 @@
+//! The simulated robot: a plant with sticking friction, the paper's sensors, and its experiments.
+
+mod noise;
+mod plant;
+mod sample;
+mod sensors;
+mod simulation;
+mod statistics;
+
+pub use plant::{Forcing, Plant};
+pub use sample::Sample;
+pub use sensors::SensorSettings;
+pub use simulation::{FALL_PITCH_RAD, Fall, Simulation, SimulationError, SimulationSettings, TICK_S};
+pub use statistics::{Statistics, Summary};
