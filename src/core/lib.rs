@@ -21,6 +21,7 @@
 
 pub mod control;
 pub mod friction;
+pub mod identify;
 pub mod lqr;
 pub mod model_file;
 mod parameter;

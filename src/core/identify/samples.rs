@@ -1,0 +1,133 @@
+//! The pairs laid out for speed, and the two quantities that every search needs of them: the sum of squared
+//! errors of a candidate, and the fading exp(−(|q̇|/v_s)^ξ) of every pair.
+
+use super::FrictionPair;
+use super::exp2::exp2;
+use super::parameters::{COULOMB, EXPONENT, OFFSET, Point, SPEED, STATIC, VISCOUS};
+
+/// Candidates are given up in steps of this many pairs.
+const STRIDE: usize = 64;
+/// Partial sums that are kept apart, so that the order of summation is the same for every vector width.
+const LANES: usize = 8;
+
+/// Friction pairs as columns.
+#[derive(Clone, Debug)]
+pub(super) struct Samples {
+    pub(super) speed: Vec<f64>,
+    pub(super) torque: Vec<f64>,
+    /// sign(q̇): −1, 0 or 1.
+    pub(super) direction: Vec<f64>,
+    /// log₂|q̇|; 0 at q̇ = 0, where the direction takes the fading out of the model.
+    log2_speed: Vec<f64>,
+}
+
+impl Samples {
+    pub(super) fn new(pairs: &[FrictionPair]) -> Self {
+        let direction = |q: f64| if q == 0.0 { 0.0 } else { q.signum() };
+        Self {
+            speed: pairs.iter().map(|p| p.speed_rad_s).collect(),
+            torque: pairs.iter().map(|p| p.torque_nm).collect(),
+            direction: pairs.iter().map(|p| direction(p.speed_rad_s)).collect(),
+            log2_speed: pairs
+                .iter()
+                .map(|p| p.speed_rad_s.abs())
+                .map(|q| if q == 0.0 { 0.0 } else { libm::log2(q) })
+                .collect(),
+        }
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.speed.len()
+    }
+
+    /// Root of the mean of squares, N m (Eq. 32).
+    pub(super) fn rmse(&self, sum_of_squares: f64) -> f64 {
+        (sum_of_squares / self.len() as f64).sqrt()
+    }
+
+    /// Σ (τ̄_f − τ̂_f)² of one candidate, (N m)².
+    pub(super) fn sum_of_squares(&self, point: &Point) -> f64 {
+        let mut sum = [f64::INFINITY];
+        self.improve(&[*point], &mut sum);
+        sum[0]
+    }
+
+    /// For each candidate the sum of squared errors, (N m)², where it is below the number in `sums`; the others
+    /// keep theirs. The sum of a candidate stops as soon as it can no longer get below, which changes no result.
+    pub(super) fn improve(&self, candidates: &[Point], sums: &mut [f64]) {
+        pulp::Arch::new().dispatch(
+            #[inline(always)]
+            || {
+                for (candidate, sum) in candidates.iter().zip(sums) {
+                    *sum = sum_below(self, candidate, *sum);
+                }
+            },
+        );
+    }
+
+    /// For every pair u = (|q̇|/v_s)^ξ and exp(−u), both without unit.
+    pub(super) fn fade(&self, log2_stribeck_speed: f64, exponent: f64, power: &mut [f64], fading: &mut [f64]) {
+        pulp::Arch::new().dispatch(
+            #[inline(always)]
+            || {
+                for ((x, u), s) in self.log2_speed.iter().zip(power).zip(fading) {
+                    let (bits, value) = fading_at(*x, log2_stribeck_speed, exponent);
+                    *u = bits * std::f64::consts::LN_2;
+                    *s = value;
+                }
+            },
+        );
+    }
+}
+
+/// log₂(log₂ e): makes the outer power one of two as well.
+const OUTER: f64 = 0.528_766_372_944_897_6;
+
+/// u / ln 2 and exp(−u) for u = (|q̇|/v_s)^ξ.
+#[inline(always)]
+fn fading_at(log2_speed: f64, log2_stribeck_speed: f64, exponent: f64) -> (f64, f64) {
+    let bits = exp2(exponent * (log2_speed - log2_stribeck_speed) + OUTER);
+    (bits, exp2(-bits))
+}
+
+#[inline(always)]
+fn sum_below(samples: &Samples, point: &Point, limit: f64) -> f64 {
+    let log2_stribeck_speed = libm::log2(point[SPEED]);
+    let drop = point[STATIC] - point[COULOMB];
+    let mut lanes = [0.0; LANES];
+    let mut squares = [0.0; STRIDE];
+    let mut power = [0.0; STRIDE];
+    let mut start = 0;
+    while start < samples.len() {
+        let end = samples.len().min(start + STRIDE);
+        let count = end - start;
+        let x = &samples.log2_speed[start..end];
+        let q = &samples.speed[start..end];
+        let direction = &samples.direction[start..end];
+        let torque = &samples.torque[start..end];
+        for i in 0..count {
+            power[i] = exp2(point[EXPONENT] * (x[i] - log2_stribeck_speed) + OUTER);
+        }
+        for i in 0..count {
+            let s = exp2(-power[i]);
+            let level = (point[COULOMB] + drop * s) * direction[i];
+            let error = level + ((point[VISCOUS] * q[i] + point[OFFSET]) - torque[i]);
+            squares[i] = error * error;
+        }
+        for eight in squares[..count].chunks(LANES) {
+            for (lane, square) in lanes.iter_mut().zip(eight) {
+                *lane += square;
+            }
+        }
+        start = end;
+        let sum = ((lanes[0] + lanes[4]) + (lanes[1] + lanes[5])) + ((lanes[2] + lanes[6]) + (lanes[3] + lanes[7]));
+        // Written so that NaN, too, is no improvement.
+        if !(sum < limit) {
+            return limit;
+        }
+        if end == samples.len() {
+            return sum;
+        }
+    }
+    limit
+}

@@ -1,0 +1,213 @@
+//! The particle swarm of the paper's Algorithm 1 (Eqs. 39 to 42, Tables 2 and 3).
+
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+
+use super::parameters::{Point, named};
+use super::samples::Samples;
+use super::{FrictionPair, SearchBox};
+use crate::friction::StribeckParameters;
+
+/// Settings of Algorithm 1; the default is Table 2.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PsoSettings {
+    /// M, number of particles.
+    pub particles: usize,
+    /// c₁, pull towards a particle's own best.
+    pub learn_cognitive: f64,
+    /// c₂, pull towards the best of all.
+    pub learn_social: f64,
+    /// ω_s, inertia at the start.
+    pub inertia_start: f64,
+    /// ω_e, inertia at the end.
+    pub inertia_end: f64,
+    /// α, share of the velocity that a position moves by.
+    pub constraint_factor: f64,
+    /// Largest velocity of a parameter as a share of its range. The paper prints 0.5 without a unit; an absolute
+    /// 0.5 would be no limit at all for f_v and a severe one for v_s, and only the relative reading keeps the rule
+    /// "restore, invert, move again" inside of the range: α · 0.5 = 0.3 of it is less than half.
+    pub velocity_limit: f64,
+    /// T, number of iterations.
+    pub iterations: usize,
+    /// The search ends when the best error (RMSE, N m) is below this in two consecutive iterations. The paper
+    /// names no number; the default of 0 never ends it.
+    pub error_threshold: f64,
+}
+
+impl Default for PsoSettings {
+    fn default() -> Self {
+        Self {
+            particles: 128,
+            learn_cognitive: 1.6,
+            learn_social: 2.0,
+            inertia_start: 0.9,
+            inertia_end: 0.4,
+            constraint_factor: 0.6,
+            velocity_limit: 0.5,
+            iterations: 500,
+            error_threshold: 0.0,
+        }
+    }
+}
+
+/// The swarm after one iteration.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PsoProgress {
+    /// Iterations done, from 1.
+    pub iteration: usize,
+    /// Best error so far: RMSE over the pairs, N m.
+    pub best_error_nm: f64,
+    /// The parameters that have it.
+    pub best: StribeckParameters,
+}
+
+/// Algorithm 1 as an iterator: each item is one iteration; dropping it ends the search.
+///
+/// Per particle and dimension v ← ω v + c₁k₁(p − x) + c₂k₂(g − x), limited, and x ← x + α v (Eq. 41) with fresh
+/// k₁, k₂ in [0, 1); ω = ω_e + (ω_s − ω_e)(T − t)/T (Eq. 42). A coordinate that would leave its range goes back,
+/// inverts its velocity and moves again. p follows within the iteration, g after it, as Algorithm 1 has it. The
+/// fitness is 1/error (Eq. 40), so the smaller error wins. Same pairs, box, settings and seed: same bytes.
+#[derive(Clone, Debug)]
+pub struct Pso {
+    samples: Samples,
+    range: SearchBox,
+    settings: PsoSettings,
+    random: ChaCha8Rng,
+    iteration: usize,
+    below_threshold: usize,
+    positions: Vec<Point>,
+    velocities: Vec<Point>,
+    best_positions: Vec<Point>,
+    best_sums: Vec<f64>,
+    sums: Vec<f64>,
+    global: usize,
+    global_best: Point,
+}
+
+impl Pso {
+    /// Spreads the particles over the box. Needs at least one pair and one particle, finite pairs and a box whose
+    /// lower bounds are not above its upper ones; otherwise the search finds nothing and ends at once.
+    pub fn new(pairs: &[FrictionPair], range: SearchBox, settings: PsoSettings, seed: u64) -> Self {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut draw = |low: f64, width: f64| low + uniform(&mut random) * width;
+        let mut positions = Vec::with_capacity(settings.particles);
+        let mut velocities = Vec::with_capacity(settings.particles);
+        for _ in 0..settings.particles {
+            positions.push(std::array::from_fn(|d| draw(range.lower[d], range.width(d)).min(range.upper[d])));
+            velocities.push(std::array::from_fn(|d| {
+                let limit = settings.velocity_limit * range.width(d);
+                draw(-limit, 2.0 * limit)
+            }));
+        }
+        let samples = Samples::new(pairs);
+        let mut best_sums = vec![f64::INFINITY; settings.particles];
+        samples.improve(&positions, &mut best_sums);
+        let global = smallest(&best_sums);
+        Self {
+            global_best: positions.get(global).copied().unwrap_or(range.lower),
+            best_positions: positions.clone(),
+            sums: best_sums.clone(),
+            iteration: 0,
+            below_threshold: 0,
+            samples,
+            range,
+            settings,
+            random,
+            positions,
+            velocities,
+            best_sums,
+            global,
+        }
+    }
+
+    /// The best of the swarm so far, also before the first iteration.
+    pub fn progress(&self) -> PsoProgress {
+        let sum = self.best_sums.get(self.global).copied().unwrap_or(f64::INFINITY);
+        PsoProgress {
+            iteration: self.iteration,
+            best_error_nm: self.samples.rmse(sum),
+            best: named(&self.global_best),
+        }
+    }
+
+    /// Whether the search ended because the error stayed below the threshold.
+    pub fn reached_threshold(&self) -> bool {
+        self.below_threshold >= 2
+    }
+
+    pub(super) fn best_point(&self) -> &Point {
+        &self.global_best
+    }
+
+    #[cfg(test)]
+    fn positions(&self) -> &[Point] {
+        &self.positions
+    }
+
+    fn move_particles(&mut self) {
+        let settings = self.settings;
+        let remaining = (settings.iterations - self.iteration) as f64 / settings.iterations as f64;
+        let inertia = settings.inertia_end + (settings.inertia_start - settings.inertia_end) * remaining;
+        for n in 0..self.positions.len() {
+            for d in 0..6 {
+                let (x, v) = (self.positions[n][d], self.velocities[n][d]);
+                let own = settings.learn_cognitive * uniform(&mut self.random) * (self.best_positions[n][d] - x);
+                let social = settings.learn_social * uniform(&mut self.random) * (self.global_best[d] - x);
+                let limit = settings.velocity_limit * self.range.width(d);
+                let v = (inertia * v + own + social).clamp(-limit, limit);
+                (self.positions[n][d], self.velocities[n][d]) = self.stepped(d, x, v);
+            }
+        }
+    }
+
+    /// One coordinate's move; the last clamp acts only where settings allow steps of more than half the range.
+    fn stepped(&self, d: usize, x: f64, v: f64) -> (f64, f64) {
+        let (low, high) = (self.range.lower[d], self.range.upper[d]);
+        let moved = x + self.settings.constraint_factor * v;
+        if (low..=high).contains(&moved) {
+            return (moved, v);
+        }
+        ((x - self.settings.constraint_factor * v).clamp(low, high), -v)
+    }
+
+    fn remember_bests(&mut self) {
+        self.sums.copy_from_slice(&self.best_sums);
+        self.samples.improve(&self.positions, &mut self.sums);
+        for n in 0..self.sums.len() {
+            if self.sums[n] < self.best_sums[n] {
+                self.best_sums[n] = self.sums[n];
+                self.best_positions[n] = self.positions[n];
+            }
+        }
+        self.global = smallest(&self.best_sums);
+        self.global_best = self.best_positions[self.global];
+    }
+}
+
+impl Iterator for Pso {
+    type Item = PsoProgress;
+
+    fn next(&mut self) -> Option<PsoProgress> {
+        let empty = self.positions.is_empty() || self.samples.len() == 0;
+        if empty || self.iteration == self.settings.iterations || self.reached_threshold() {
+            return None;
+        }
+        self.move_particles();
+        self.remember_bests();
+        self.iteration += 1;
+        let progress = self.progress();
+        let below = progress.best_error_nm < self.settings.error_threshold;
+        self.below_threshold = if below { self.below_threshold + 1 } else { 0 };
+        Some(progress)
+    }
+}
+
+/// The first of the smallest numbers.
+fn smallest(numbers: &[f64]) -> usize {
+    (0..numbers.len()).reduce(|best, n| if numbers[n] < numbers[best] { n } else { best }).unwrap_or(0)
+}
+
+/// Uniform in [0, 1) with 53 bits; written out so that it stays the same whatever a random library does.
+fn uniform(random: &mut ChaCha8Rng) -> f64 {
+    (random.next_u64() >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
+}
