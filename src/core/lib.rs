@@ -9,7 +9,8 @@
 //! | [`control`] | one pure step from measurements to motor torques |
 //! | [`simulate`] | plant with sticking friction, sensors, scenarios |
 //! | [`record`] | logs: schema, reading, writing, health |
-//! | `identify` | friction and inertia from logs |
+//! | [`identify`] | friction and inertia from logs |
+//! | [`export`] | a controller as C header, JSON, YAML or CSV |
 //! | [`model_file`] | models on disk (TOML) |
 //!
 //! # Invariants
@@ -20,6 +21,7 @@
 //! - Nothing here knows the window.
 
 pub mod control;
+pub mod export;
 pub mod friction;
 pub mod identify;
 pub mod lqr;

@@ -38,6 +38,16 @@ impl Feedforward {
         Ok(Self { curve, compensation })
     }
 
+    /// The curve that is fed forward.
+    pub fn curve(&self) -> &Stribeck {
+        &self.curve
+    }
+
+    /// Ratio and smoothing speed.
+    pub fn compensation(&self) -> &Compensation {
+        &self.compensation
+    }
+
     /// Torque to add to the controller's, N m. At q̇ = 0 it is ratio · f_p with the finite slope
     /// ratio · (f_s / smoothing speed + f_v).
     pub fn torque_nm(&self, motor_speed_rad_s: f64) -> f64 {

@@ -13,14 +13,8 @@ pub(super) const VISCOUS: usize = 4;
 pub(super) const OFFSET: usize = 5;
 
 /// Keys of the model file, in the order of [`Point`].
-pub(super) const KEYS: [&str; 6] = [
-    "coulomb_nm",
-    "static_nm",
-    "stribeck_speed_rad_s",
-    "stribeck_exponent",
-    "viscous_nm_s_rad",
-    "offset_nm",
-];
+pub(super) const KEYS: [&str; 6] =
+    ["coulomb_nm", "static_nm", "stribeck_speed_rad_s", "stribeck_exponent", "viscous_nm_s_rad", "offset_nm"];
 
 pub(super) fn named(point: &Point) -> StribeckParameters {
     StribeckParameters {

@@ -151,7 +151,8 @@ impl Pso {
         for n in 0..self.positions.len() {
             for d in 0..6 {
                 let (x, v) = (self.positions[n][d], self.velocities[n][d]);
-                let own = settings.learn_cognitive * uniform(&mut self.random) * (self.best_positions[n][d] - x);
+                let own =
+                    settings.learn_cognitive * uniform(&mut self.random) * (self.best_positions[n][d] - x);
                 let social = settings.learn_social * uniform(&mut self.random) * (self.global_best[d] - x);
                 let limit = settings.velocity_limit * self.range.width(d);
                 let v = (inertia * v + own + social).clamp(-limit, limit);

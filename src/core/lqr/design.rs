@@ -187,10 +187,9 @@ fn cause(a: &DMatrix<f64>, b: &DMatrix<f64>, q: &DMatrix<f64>, pole: Complex<f64
         return CareError::NotStabilisable { eigenvalue: mode.eigenvalue }.into();
     }
     match lost_mode(a, q) {
-        Some(mode) => DesignError::NotDetectable {
-            eigenvalue: mode.eigenvalue,
-            state: STATES[mode.direction.icamax()],
-        },
+        Some(mode) => {
+            DesignError::NotDetectable { eigenvalue: mode.eigenvalue, state: STATES[mode.direction.icamax()] }
+        }
         None => DesignError::NotStable { pole },
     }
 }

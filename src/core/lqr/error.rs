@@ -73,7 +73,9 @@ pub enum DesignError {
     #[error(transparent)]
     Equation(#[from] CareError),
     /// Q would reward some state.
-    #[error("matrix q is not positive semidefinite: no state and no combination of states may cost less than 0")]
+    #[error(
+        "matrix q is not positive semidefinite: no state and no combination of states may cost less than 0"
+    )]
     QNotPositiveSemidefinite,
     /// A mode on or right of the imaginary axis costs nothing.
     #[error(
