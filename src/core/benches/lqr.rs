@@ -25,7 +25,7 @@ fn robot() -> LinearModel {
 }
 
 /// What one drag of a slider costs: P, K, residual and poles of four states and two inputs.
-#[divan::bench]
+#[divan::bench(sample_size = 1000)]
 fn design_of_the_robot(bencher: Bencher) {
     let (model, weights) = (robot(), Weights::diagonal([60.0, 30.0, 100.0, 5.0], [20.0, 20.0]));
     bencher.bench_local(|| design(black_box(&model), black_box(&weights)));

@@ -30,9 +30,11 @@ pub struct LqrDesign {
 const SEMIDEFINITE_TOLERANCE: f64 = 1e-14;
 /// R's determinant, relative to the product of its diagonal, below which G needs more digits than a double.
 const WELL_CONDITIONED: f64 = 1e-3;
-/// Residual, relative to the terms of the equation, above which the quick path gives way to the thorough one.
-const QUICK_RESIDUAL: f64 = 1e-14;
-/// Relative size of the Newton step above which the quick path gives way.
+/// Residual, relative to P, above which the quick path gives way to the thorough one.
+const QUICK_RESIDUAL: f64 = 1e-13;
+/// The same for the relative error of P.
+const QUICK_ERROR: f64 = 1e-12;
+/// Relative size of the Newton step whose square is below every other error.
 const QUICK_CORRECTION: f64 = 1e-7;
 /// Distance to the imaginary axis, relative to the norm of A, below which the quick path cannot be sure of a
 /// pole's side.
@@ -120,12 +122,14 @@ fn quick(model: &LinearModel, weights: &Weights) -> Option<LqrDesign> {
     };
     let shift = shift(&equation)?;
     let doubled = double(&equation, shift, Rest { change: 1e-5, steps: 30 })?;
-    let closed_loop = equation.closed_loop(&doubled);
-    let correction = lyapunov(&closed_loop, &equation.residual(&doubled), shift, 30)?;
+    let doubled_residual = equation.residual(&doubled);
+    let correction = lyapunov(&equation.closed_loop(&doubled), &doubled_residual, shift, 30)?;
     let p = doubled.plus_multiple(&correction, 1.0);
-    let residual = equation.residual(&p).norm();
-    let terms = p.times(&equation.a).norm() + equation.q.norm();
-    if !(residual <= QUICK_RESIDUAL * terms && correction.norm() <= QUICK_CORRECTION * p.norm()) {
+    let relative = |matrix: &Square4| matrix.norm() / p.norm();
+    let (residual, change) = (relative(&equation.residual(&p)), relative(&correction));
+    // What is left of the residual asks for a correction in proportion.
+    let error = residual * change / relative(&doubled_residual).max(f64::MIN_POSITIVE);
+    if !(residual <= QUICK_RESIDUAL && change <= QUICK_CORRECTION && error <= QUICK_ERROR) {
         return None;
     }
     let mut poles = [Complex::default(); 4];
@@ -135,7 +139,7 @@ fn quick(model: &LinearModel, weights: &Weights) -> Option<LqrDesign> {
         return None;
     }
     let cost = Matrix4::from_row_slice(&p.0);
-    Some(LqrDesign { gain: input * cost, cost, poles, riccati_residual: residual / p.norm() })
+    Some(LqrDesign { gain: input * cost, cost, poles, riccati_residual: residual })
 }
 
 /// R⁻¹Bᵀ; its rows are equal to the last bit where B's columns are and R's diagonal is.
@@ -151,11 +155,12 @@ fn square(matrix: &Matrix4<f64>) -> Square4 {
     Square4(std::array::from_fn(|index| matrix[(index / 4, index % 4)]))
 }
 
-/// The root mean square of the poles, from the trace of the Hamiltonian's square.
+/// Half the root mean square of the poles, which is nearer to their middle, from the trace of the
+/// Hamiltonian's square.
 #[inline(always)]
 fn shift(equation: &Riccati<Square4>) -> Option<f64> {
     let squares = equation.a.trace_of_product(&equation.a) + equation.g.trace_of_product(&equation.q);
-    let mean = (0.25 * squares.abs()).sqrt();
+    let mean = 0.5 * (0.25 * squares.abs()).sqrt();
     (mean > 0.0 && mean.is_finite()).then_some(mean)
 }
 

@@ -49,128 +49,107 @@ struct Reflection<T> {
 impl<T: Real> Reflection<T> {
     /// `None` where the vector is a multiple of the first coordinate already.
     #[inline(always)]
-    fn new(vector: [T; 3]) -> Option<Self> {
-        let largest = vector.iter().fold(0.0, |largest, x| x.abs().to_f64().max(largest));
-        if vector[1].abs().to_f64().max(vector[2].abs().to_f64()) == 0.0 {
+    fn new([x, y, z]: [T; 3]) -> Option<Self> {
+        let others = y * y + z * z;
+        if others.to_f64() == 0.0 {
             return None;
         }
-        let unit = T::ONE / T::from_f64(largest);
-        let [x, y, z] = vector.map(|entry| entry * unit);
-        let length = (x * x + y * y + z * z).sqrt();
-        let first = if x < T::ZERO { x - length } else { x + length };
-        let (second, third) = (y / first, z / first);
-        let scale = first.abs() / length;
-        Some(Self { v: [T::ONE, second, third], w: [scale, scale * second, scale * third] })
+        let (first, beta) = householder(x, others);
+        Some(Self { v: [first, y, z], w: [beta * first, beta * y, beta * z] })
     }
 
-    /// Reflects `count` rows from `top` on, in the columns from `start` to `end` exclusive.
+    /// Reflects `COUNT` rows from `top` on, in the columns from `start` to `end` exclusive.
     #[inline(always)]
-    fn rows<M: Square<Scalar = T>>(
-        &self,
-        matrix: &mut M,
-        top: usize,
-        count: usize,
-        start: usize,
-        end: usize,
-    ) {
+    fn rows<const COUNT: usize, M>(&self, matrix: &mut M, top: usize, start: usize, end: usize)
+    where
+        M: Square<Scalar = T>,
+    {
         for column in start..end {
-            let mut sum = T::ZERO;
-            for i in 0..count {
-                sum += self.v[i] * matrix.at(top + i, column);
-            }
-            for i in 0..count {
-                let entry = matrix.at(top + i, column) - self.w[i] * sum;
-                matrix.set(top + i, column, entry);
+            let entries: [T; COUNT] = std::array::from_fn(|i| matrix.at(top + i, column));
+            let along = self.along(&entries);
+            for (i, entry) in entries.into_iter().enumerate() {
+                matrix.set(top + i, column, entry - self.w[i] * along);
             }
         }
     }
 
-    /// Reflects `count` columns from `left` on, in the rows from `start` to `end` exclusive.
+    /// Reflects `COUNT` columns from `left` on, in the rows from `start` to `end` exclusive.
     #[inline(always)]
-    fn columns<M: Square<Scalar = T>>(
-        &self,
-        matrix: &mut M,
-        left: usize,
-        count: usize,
-        start: usize,
-        end: usize,
-    ) {
+    fn columns<const COUNT: usize, M>(&self, matrix: &mut M, left: usize, start: usize, end: usize)
+    where
+        M: Square<Scalar = T>,
+    {
         for row in start..end {
-            let mut sum = T::ZERO;
-            for i in 0..count {
-                sum += self.v[i] * matrix.at(row, left + i);
-            }
-            for i in 0..count {
-                let entry = matrix.at(row, left + i) - self.w[i] * sum;
-                matrix.set(row, left + i, entry);
+            let entries: [T; COUNT] = std::array::from_fn(|i| matrix.at(row, left + i));
+            let along = self.along(&entries);
+            for (i, entry) in entries.into_iter().enumerate() {
+                matrix.set(row, left + i, entry - self.w[i] * along);
             }
         }
+    }
+
+    /// vᵀ · entries
+    #[inline(always)]
+    fn along<const COUNT: usize>(&self, entries: &[T; COUNT]) -> T {
+        let pair = self.v[0] * entries[0] + self.v[1] * entries[1];
+        if COUNT == 3 { pair + self.v[2] * entries[2] } else { pair }
     }
 }
 
-/// Clears each column below its subdiagonal, by reflections of the pairs (column + 1, row).
+/// First entry of v and β of the reflection I − β v vᵀ for a vector that starts with `x` and goes on with
+/// entries whose squares add up to `others`; these are v's too.
+#[inline(always)]
+fn householder<T: Real>(x: T, others: T) -> (T, T) {
+    let squares = x * x + others;
+    let length = squares.sqrt();
+    let first = if x < T::ZERO { x - length } else { x + length };
+    (first, T::ONE / (squares + x.abs() * length))
+}
+
+/// Clears each column below its subdiagonal by a reflection of the rows and columns after it.
 #[inline(always)]
 fn reduce_to_hessenberg<M: Square>(matrix: &mut M) {
     let size = matrix.size();
+    // Its first row holds the vector of the reflection.
+    let mut v = matrix.zeros();
     for column in 0..size.saturating_sub(2) {
-        eliminate(matrix, column);
+        let top = column + 1;
+        let others = (top + 1..size).fold(M::Scalar::ZERO, |sum, row| {
+            sum + matrix.at(row, column) * matrix.at(row, column)
+        });
+        if others.to_f64() == 0.0 {
+            continue;
+        }
+        let x = matrix.at(top, column);
+        let (first, beta) = householder(x, others);
+        v.set(0, top, first);
+        for row in top + 1..size {
+            v.set(0, row, matrix.at(row, column));
+        }
+        reflect(matrix, v.row(0), top, beta);
+        for row in top + 1..size {
+            matrix.set(row, column, M::Scalar::ZERO);
+        }
     }
 }
 
-/// One Householder similarity: rows and columns after `column`.
+/// Applies I − β v vᵀ from both sides, v being zero before `top`.
 #[inline(always)]
-fn eliminate<M: Square>(matrix: &mut M, column: usize) {
+fn reflect<M: Square>(matrix: &mut M, v: &[M::Scalar], top: usize, beta: M::Scalar) {
     let size = matrix.size();
-    let top = column + 1;
-    let mut largest = 0.0_f64;
-    for row in top + 1..size {
-        largest = largest.max(matrix.at(row, column).abs().to_f64());
-    }
-    if largest == 0.0 {
-        return;
-    }
-    largest = largest.max(matrix.at(top, column).abs().to_f64());
-    let unit = M::Scalar::ONE / M::Scalar::from_f64(largest);
-    let mut squares = M::Scalar::ZERO;
-    for row in top..size {
-        let entry = matrix.at(row, column) * unit;
-        squares += entry * entry;
-    }
-    let length = squares.sqrt();
-    let x = matrix.at(top, column) * unit;
-    let first = if x < M::Scalar::ZERO { x - length } else { x + length };
-    // v = (1, …) stays in the column below the subdiagonal while it is applied to the rest.
-    let to_v = unit / first;
-    for row in top + 1..size {
-        let entry = matrix.at(row, column) * to_v;
-        matrix.set(row, column, entry);
-    }
-    matrix.set(top, column, M::Scalar::ONE);
-    let scale = first.abs() / length;
-    for other in column + 1..size {
-        let mut sum = M::Scalar::ZERO;
+    for column in top - 1..size {
+        let along = (top..size).fold(M::Scalar::ZERO, |sum, row| sum + v[row] * matrix.at(row, column));
         for row in top..size {
-            sum += matrix.at(row, column) * matrix.at(row, other);
-        }
-        for row in top..size {
-            let entry = matrix.at(row, other) - scale * sum * matrix.at(row, column);
-            matrix.set(row, other, entry);
+            let entry = matrix.at(row, column) - v[row] * (beta * along);
+            matrix.set(row, column, entry);
         }
     }
     for row in 0..size {
-        let mut sum = M::Scalar::ZERO;
-        for other in top..size {
-            sum += matrix.at(row, other) * matrix.at(other, column);
+        let along = (top..size).fold(M::Scalar::ZERO, |sum, column| sum + v[column] * matrix.at(row, column));
+        for column in top..size {
+            let entry = matrix.at(row, column) - v[column] * (beta * along);
+            matrix.set(row, column, entry);
         }
-        for other in top..size {
-            let entry = matrix.at(row, other) - scale * sum * matrix.at(other, column);
-            matrix.set(row, other, entry);
-        }
-    }
-    let image = if x < M::Scalar::ZERO { length } else { -length };
-    matrix.set(top, column, image * M::Scalar::from_f64(largest));
-    for row in top + 1..size {
-        matrix.set(row, column, M::Scalar::ZERO);
     }
 }
 
@@ -220,16 +199,20 @@ fn francis_step<M: Square>(matrix: &mut M, first: usize, end: usize, exceptional
         below * (corner + next - trace),
         below * matrix.at(first + 2, first + 1),
     ];
+    let size = matrix.size();
     for row in first..end {
-        let count = if row + 2 <= end { 3 } else { 2 };
         if let Some(reflection) = Reflection::new(bulge) {
-            let start = if row > first { row - 1 } else { first };
-            if count == 3 {
-                reflection.rows(matrix, row, 3, start, end + 1);
-                reflection.columns(matrix, row, 3, first, (row + 4).min(end + 1));
+            // Of few rows it is faster to reflect all than to count those that matter.
+            let (left, right, top, bottom) = match size {
+                ..=4 => (0, size, 0, size),
+                _ => (row.max(first + 1) - 1, end + 1, first, (row + 4).min(end + 1)),
+            };
+            if row + 2 <= end {
+                reflection.rows::<3, M>(matrix, row, left, right);
+                reflection.columns::<3, M>(matrix, row, top, bottom);
             } else {
-                reflection.rows(matrix, row, 2, start, end + 1);
-                reflection.columns(matrix, row, 2, first, end + 1);
+                reflection.rows::<2, M>(matrix, row, left, right);
+                reflection.columns::<2, M>(matrix, row, top, bottom);
             }
         }
         if row + 1 < end {
