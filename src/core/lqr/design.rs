@@ -1,6 +1,7 @@
 //! The robot's LQR design: four states, two inputs, on the stack.
 
 use nalgebra::{Complex, DMatrix, Matrix2, Matrix2x4, Matrix4, Matrix4x2, SMatrix};
+use pulp::{Arch, NullaryFnOnce};
 
 use super::care::{CareInput, solve_care};
 use super::checks::{check_finite, check_symmetric};
@@ -60,7 +61,7 @@ const STATES: [&str; 4] = ["x", "x_dot", "pitch", "pitch_rate"];
 /// [`solve_care`] takes over.
 pub fn design(model: &LinearModel, weights: &Weights) -> Result<LqrDesign, DesignError> {
     check(model, weights)?;
-    if let Some(design) = quick(model, weights) {
+    if let Some(design) = Arch::new().dispatch(Quick { model, weights }) {
         return Ok(design);
     }
     thorough(model, weights)
@@ -106,6 +107,21 @@ fn is_positive_semidefinite(q: &Matrix4<f64>) -> bool {
 fn relative_determinant(r: &Matrix2<f64>) -> f64 {
     let ratio = r[(0, 1)] / r[(0, 0)] * (r[(1, 0)] / r[(1, 1)]);
     1.0 - ratio
+}
+
+/// [`quick`] as a call that is compiled for each instruction set; the digits are the same on all.
+struct Quick<'a> {
+    model: &'a LinearModel,
+    weights: &'a Weights,
+}
+
+impl NullaryFnOnce for Quick<'_> {
+    type Output = Option<LqrDesign>;
+
+    #[inline(always)]
+    fn call(self) -> Option<LqrDesign> {
+        quick(self.model, self.weights)
+    }
 }
 
 /// Doubling and one Newton step in double on the stack; `None` where the outcome is not good to rounding.

@@ -37,7 +37,7 @@ pub(super) fn lyapunov<M: Square>(c: &M, right: &M, shift: f64, steps: usize) ->
     for _ in 0..steps {
         let size = power.norm_squared();
         // Sum and power are then complete to rounding.
-        if size < M::Scalar::EPSILON * 1e-4 {
+        if size < M::Scalar::EPSILON {
             return Some(sum.symmetric_part());
         }
         if !size.is_finite() {
