@@ -131,19 +131,25 @@ pub struct Accelerations {
 }
 
 impl Coefficients {
-    /// ẍ and θ̈ of Eqs. 4 and 5 under any loads: `along_nm` drives the wheels (ΣT of the shafts, plus r times a
-    /// horizontal force), `about_nm` turns the body about the axle (−ΣT, plus h cos θ times a horizontal
-    /// force that acts h above the axle).
-    pub fn accelerations(&self, state: &State, along_nm: f64, about_nm: f64) -> Accelerations {
+    /// ẍ and θ̈ of Eqs. 4 and 5 under any loads: `along_nm` drives the wheels (ΣT of the shafts, plus r times
+    /// a horizontal force), `about_nm` turns the body about the axle (−ΣT, plus h cos θ times a horizontal
+    /// force that acts h above the axle). The state enters by sin θ, cos θ and θ̇.
+    #[inline]
+    pub fn accelerations(
+        &self,
+        (sin, cos): (f64, f64),
+        pitch_rate_rad_s: f64,
+        along_nm: f64,
+        about_nm: f64,
+    ) -> Accelerations {
         let Self { c1, c2, c3, c4, c5, .. } = *self;
-        let (sin, cos) = state.pitch_rad.sin_cos();
         // c1 ẍ + c2 cos θ θ̈ = along, c5 cos θ ẍ + c3 θ̈ = about
-        let along = along_nm + c2 * state.pitch_rate_rad_s * state.pitch_rate_rad_s * sin;
+        let along = along_nm + c2 * pitch_rate_rad_s * pitch_rate_rad_s * sin;
         let about = about_nm + c4 * sin;
-        let determinant = c1 * c3 - c2 * c5 * cos * cos;
+        let inverse = 1.0 / (c1 * c3 - c2 * c5 * cos * cos);
         Accelerations {
-            x_ddot_m_s2: (c3 * along - c2 * cos * about) / determinant,
-            pitch_accel_rad_s2: (c1 * about - c5 * cos * along) / determinant,
+            x_ddot_m_s2: (c3 * along - c2 * cos * about) * inverse,
+            pitch_accel_rad_s2: (c1 * about - c5 * cos * along) * inverse,
         }
     }
 }
@@ -192,7 +198,12 @@ impl RobotParameters {
     /// ẍ and θ̈ of the nonlinear dynamics (Eqs. 4, 5) under `shaft_torque_nm`, the sum of both motors'
     /// torques after friction.
     pub fn accelerations(&self, state: &State, shaft_torque_nm: f64) -> Accelerations {
-        self.coefficients().accelerations(state, shaft_torque_nm, -shaft_torque_nm)
+        self.coefficients().accelerations(
+            state.pitch_rad.sin_cos(),
+            state.pitch_rate_rad_s,
+            shaft_torque_nm,
+            -shaft_torque_nm,
+        )
     }
 
     /// Motor speed q̇ = ẋ/r − θ̇, rad/s, that goes with a state.

@@ -1,10 +1,12 @@
 //! The simulated robot: a plant with sticking friction, the paper's sensors, and its experiments.
 
+mod near_angle;
 mod noise;
 mod plant;
 mod sample;
 mod sensors;
 mod simulation;
+mod sliding;
 mod statistics;
 
 pub use plant::{Forcing, Plant};

@@ -11,10 +11,12 @@
 
 use std::ops::RangeInclusive;
 
+use super::near_angle::NearAngle;
+use super::sliding::SlidingFriction;
 use crate::friction::Stribeck;
 use crate::robot::{Coefficients, RobotParameters, State};
 
-/// Changes of phase within one substep after which the shaft is taken as stuck for the rest of it.
+/// Changes of phase within one substep after which the shafts are taken as stuck for the rest of it.
 const MAX_CHANGES: usize = 8;
 /// Share of a substep to which the instant of a change of phase is located.
 const INSTANT_TOLERANCE: f64 = 1e-9;
@@ -31,24 +33,25 @@ pub struct Forcing {
 }
 
 /// A robot in motion.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Plant {
-    coefficients: Coefficients,
-    radius_m: f64,
-    friction: [Option<Stribeck>; 2],
-    /// Sum of both motors' ranges at rest; none where no torque is needed to turn a resting shaft.
-    stick_range_nm: Option<RangeNm>,
+    laws: Laws,
     motion: Motion,
     phase: Phase,
 }
 
-#[derive(Clone, Copy, Debug)]
-struct RangeNm {
-    low: f64,
-    high: f64,
+/// What does not change as the robot moves.
+#[derive(Clone, Debug)]
+struct Laws {
+    coefficients: Coefficients,
+    radius_m: f64,
+    per_radius: f64,
+    sliding: SlidingFriction,
+    /// Sum of both motors' ranges at rest, N m; none where no torque is needed to turn a resting shaft.
+    stick_range_nm: Option<RangeInclusive<f64>>,
 }
 
-/// q, q̇, θ, θ̇; also their time derivatives.
+/// q, q̇, θ, θ̇; also their rates of change.
 #[derive(Clone, Copy, Debug)]
 struct Motion {
     angle: f64,
@@ -59,49 +62,51 @@ struct Motion {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Phase {
-    /// Friction without a range at rest: one smooth law for all speeds.
+    /// Friction without a range at rest: one continuous law for all speeds.
     Free,
-    /// The shaft turns forward (1) or backward (−1).
+    /// The shafts turn forward (1) or backward (−1).
     Slide(f64),
-    /// q̇ = 0 held by friction.
+    /// q̇ = 0, held by friction.
     Stuck,
 }
 
-impl Motion {
-    fn moved(&self, rate: &Self, dt: f64) -> Self {
-        Self {
-            angle: self.angle + dt * rate.angle,
-            speed: self.speed + dt * rate.speed,
-            pitch: self.pitch + dt * rate.pitch,
-            pitch_rate: self.pitch_rate + dt * rate.pitch_rate,
-        }
-    }
+/// The loads of one tick, with the pitch at its start.
+struct Loads {
+    torque_nm: f64,
+    push_n: f64,
+    push_height_m: f64,
+    start: NearAngle,
 }
 
 impl Plant {
     /// A robot at `state`. The parameters are taken as validated.
     pub fn new(parameters: &RobotParameters, friction: [Option<Stribeck>; 2], state: &State) -> Self {
-        let radius_m = parameters.wheel_radius_m;
+        let laws = Laws::new(parameters, &friction);
         let motion = Motion {
-            angle: state.x_m / radius_m - state.pitch_rad,
+            angle: state.x_m / parameters.wheel_radius_m - state.pitch_rad,
             speed: parameters.motor_speed_rad_s(state),
             pitch: state.pitch_rad,
             pitch_rate: state.pitch_rate_rad_s,
         };
-        let stick_range_nm = stick_range(&friction);
-        let phase = if stick_range_nm.is_none() {
+        let phase = if laws.stick_range_nm.is_none() {
             Phase::Free
         } else if motion.speed == 0.0 {
             Phase::Stuck
         } else {
             Phase::Slide(motion.speed.signum())
         };
-        Self { coefficients: parameters.coefficients(), radius_m, friction, stick_range_nm, motion, phase }
+        Self { laws, motion, phase }
     }
 
     /// The true state.
     pub fn state(&self) -> State {
-        self.state_of(&self.motion)
+        let Motion { angle, speed, pitch, pitch_rate } = self.motion;
+        State {
+            x_m: self.laws.radius_m * (angle + pitch),
+            x_dot_m_s: self.laws.radius_m * (speed + pitch_rate),
+            pitch_rad: pitch,
+            pitch_rate_rad_s: pitch_rate,
+        }
     }
 
     /// Motor angle q = x/r − θ, rad.
@@ -120,33 +125,39 @@ impl Plant {
     }
 
     /// Moves on by `dt_s` in `substeps` equal steps of order 4.
-    pub fn advance(&mut self, forcing: &Forcing, dt_s: f64, substeps: usize) {
-        let step = dt_s / substeps as f64;
+    pub fn advance(&mut self, forcing: &Forcing, dt_s: f64, substeps: u32) {
+        let loads = Loads {
+            torque_nm: forcing.torque_nm.iter().sum(),
+            push_n: forcing.push_n,
+            push_height_m: forcing.push_height_m,
+            start: NearAngle::new(self.motion.pitch),
+        };
+        let step = dt_s / f64::from(substeps);
         for _ in 0..substeps {
-            self.substep(forcing, step);
+            self.substep(&loads, step);
         }
     }
 
-    fn substep(&mut self, forcing: &Forcing, step: f64) {
+    fn substep(&mut self, loads: &Loads, step: f64) {
         let mut left = step;
         for _ in 0..MAX_CHANGES {
-            if self.phase == Phase::Stuck && self.margin(forcing, &self.motion) < 0.0 {
-                self.leave(forcing);
+            if self.phase == Phase::Stuck && self.margin(loads, &self.motion) < 0.0 {
+                self.leave(loads);
             }
-            let next = self.runge_kutta(forcing, left);
-            if self.margin(forcing, &next) >= 0.0 {
+            let next = self.runge_kutta(loads, left);
+            if self.margin(loads, &next) >= 0.0 {
                 self.motion = next;
                 return;
             }
-            let share = self.locate_change(forcing, left, &next);
-            self.motion = self.runge_kutta(forcing, left * share);
+            let share = self.locate_change(loads, left, &next);
+            self.motion = self.runge_kutta(loads, left * share);
             left *= 1.0 - share;
             if self.phase != Phase::Stuck {
                 self.stop();
             }
         }
         self.stop();
-        self.motion = self.runge_kutta(forcing, left);
+        self.motion = self.runge_kutta(loads, left);
     }
 
     fn stop(&mut self) {
@@ -154,42 +165,43 @@ impl Plant {
         self.phase = Phase::Stuck;
     }
 
-    /// From stuck to sliding: in the direction of the torque that friction could not hold.
-    fn leave(&mut self, forcing: &Forcing) {
-        let needed = self.holding_torque(forcing, &self.motion);
-        let range = self.stick_range_nm.expect("only friction with a range at rest sticks");
-        self.phase = Phase::Slide(if needed > range.high { 1.0 } else { -1.0 });
+    /// From stuck to sliding, in the direction of the torque that friction could not hold.
+    fn leave(&mut self, loads: &Loads) {
+        let (needed, _) = self.laws.held(loads, &self.motion);
+        let forward = self.laws.stick_range_nm.as_ref().is_some_and(|range| needed > *range.end());
+        self.phase = Phase::Slide(if forward { 1.0 } else { -1.0 });
     }
 
     /// At least 0 as long as the present phase goes on: the speed in the direction of sliding, or the
-    /// distance of the holding torque from the end of its range.
-    fn margin(&self, forcing: &Forcing, motion: &Motion) -> f64 {
-        match (self.phase, self.stick_range_nm) {
+    /// distance of the holding torque from the nearer end of its range.
+    #[inline]
+    fn margin(&self, loads: &Loads, motion: &Motion) -> f64 {
+        match (self.phase, &self.laws.stick_range_nm) {
             (Phase::Slide(direction), _) => direction * motion.speed,
             (Phase::Stuck, Some(range)) => {
-                let needed = self.holding_torque(forcing, motion);
-                (range.high - needed).min(needed - range.low)
+                let (needed, _) = self.laws.held(loads, motion);
+                (range.end() - needed).min(needed - range.start())
             }
             (Phase::Free, _) | (Phase::Stuck, None) => f64::INFINITY,
         }
     }
 
-    /// Share of the step `dt` at which the phase has just ended: bisection between 0, where it holds, and
-    /// 1, where it does not (`end`), sped up by the secant.
-    fn locate_change(&self, forcing: &Forcing, dt: f64, end: &Motion) -> f64 {
-        let mut holds = (0.0, self.margin(forcing, &self.motion));
-        let mut ended = (1.0, self.margin(forcing, end));
+    /// Share of the step `dt` at which the phase has just ended: between 0, where it holds, and 1, where
+    /// it does not (`end`), by secants with a bisection after each that was slow.
+    fn locate_change(&self, loads: &Loads, dt: f64, end: &Motion) -> f64 {
+        let mut holds = (0.0, self.margin(loads, &self.motion));
+        let mut ended = (1.0, self.margin(loads, end));
         let mut bisect = false;
         while ended.0 - holds.0 > INSTANT_TOLERANCE {
-            let secant = holds.0 + (ended.0 - holds.0) * holds.1 / (holds.1 - ended.1);
-            // A little beyond the secant, so that both ends close in.
+            let width = ended.0 - holds.0;
             let share = if bisect {
-                f64::midpoint(holds.0, ended.0)
+                holds.0 + 0.5 * width
             } else {
+                // A little beyond the secant, so that both ends close in.
+                let secant = holds.0 + width * holds.1 / (holds.1 - ended.1);
                 (secant + 0.4 * INSTANT_TOLERANCE).clamp(holds.0, ended.0)
             };
-            let margin = self.margin(forcing, &self.runge_kutta(forcing, dt * share));
-            let width = ended.0 - holds.0;
+            let margin = self.margin(loads, &self.runge_kutta(loads, dt * share));
             if margin >= 0.0 {
                 holds = (share, margin);
             } else {
@@ -200,73 +212,88 @@ impl Plant {
         ended.0
     }
 
-    fn runge_kutta(&self, forcing: &Forcing, dt: f64) -> Motion {
+    #[inline]
+    fn runge_kutta(&self, loads: &Loads, dt: f64) -> Motion {
         let start = &self.motion;
-        let k1 = self.rate(forcing, start);
-        let k2 = self.rate(forcing, &start.moved(&k1, 0.5 * dt));
-        let k3 = self.rate(forcing, &start.moved(&k2, 0.5 * dt));
-        let k4 = self.rate(forcing, &start.moved(&k3, dt));
-        let mean = |pick: fn(&Motion) -> f64| (pick(&k1) + 2.0 * (pick(&k2) + pick(&k3)) + pick(&k4)) / 6.0;
-        let rate = Motion {
+        let k1 = self.rate(loads, start);
+        let k2 = self.rate(loads, &start.moved(&k1, 0.5 * dt));
+        let k3 = self.rate(loads, &start.moved(&k2, 0.5 * dt));
+        let k4 = self.rate(loads, &start.moved(&k3, dt));
+        let mean = |pick: fn(&Motion) -> f64| pick(&k1) + 2.0 * (pick(&k2) + pick(&k3)) + pick(&k4);
+        let six_rates = Motion {
             angle: mean(|k| k.angle),
             speed: mean(|k| k.speed),
             pitch: mean(|k| k.pitch),
             pitch_rate: mean(|k| k.pitch_rate),
         };
-        start.moved(&rate, dt)
+        start.moved(&six_rates, dt / 6.0)
     }
 
-    fn rate(&self, forcing: &Forcing, motion: &Motion) -> Motion {
-        let applied: f64 = forcing.torque_nm.iter().sum();
-        let friction = match self.phase {
-            Phase::Free => self.sliding_friction(motion.speed, motion.speed.signum()),
-            Phase::Slide(direction) => self.sliding_friction(motion.speed, direction),
-            Phase::Stuck => self.holding_torque(forcing, motion),
+    #[inline]
+    fn rate(&self, loads: &Loads, motion: &Motion) -> Motion {
+        let (speed, pitch_rate) = match self.phase {
+            Phase::Free => self.laws.sliding(loads, motion, motion.speed.signum()),
+            Phase::Slide(direction) => self.laws.sliding(loads, motion, direction),
+            // q̈ = 0 exactly, not only up to rounding, so that the angle keeps its last bit.
+            Phase::Stuck => (0.0, self.laws.held(loads, motion).1),
         };
-        let (motor_accel, pitch_accel) = self.accelerations(forcing, motion, applied - friction);
-        // While stuck q̈ is 0 up to rounding; exactly 0 keeps the angle to the last bit.
-        let speed = if self.phase == Phase::Stuck { 0.0 } else { motor_accel };
-        Motion { angle: motion.speed, speed, pitch: motion.pitch_rate, pitch_rate: pitch_accel }
+        Motion { angle: motion.speed, speed, pitch: motion.pitch_rate, pitch_rate }
     }
+}
 
-    fn sliding_friction(&self, speed: f64, direction: f64) -> f64 {
-        let one = |curve: &Stribeck| {
-            let p = curve.parameters();
-            curve.level_nm(speed) * direction + p.viscous_nm_s_rad * speed + p.offset_nm
-        };
-        self.friction.iter().flatten().map(one).sum()
-    }
-
-    /// Friction torque, summed over both motors, that keeps q̈ = 0, N m. q̈ is linear in the shaft torque.
-    fn holding_torque(&self, forcing: &Forcing, motion: &Motion) -> f64 {
-        let applied: f64 = forcing.torque_nm.iter().sum();
-        let (free, _) = self.accelerations(forcing, motion, 0.0);
-        let per_nm = self.accelerations(forcing, motion, 1.0).0 - free;
-        applied + free / per_nm
-    }
-
-    /// q̈ and θ̈ under the sum of the shaft torques after friction, rad/s².
-    fn accelerations(&self, forcing: &Forcing, motion: &Motion, shaft_nm: f64) -> (f64, f64) {
-        let along = shaft_nm + self.radius_m * forcing.push_n;
-        let about = forcing.push_height_m * motion.pitch.cos() * forcing.push_n - shaft_nm;
-        let found = self.coefficients.accelerations(&self.state_of(motion), along, about);
-        (found.x_ddot_m_s2 / self.radius_m - found.pitch_accel_rad_s2, found.pitch_accel_rad_s2)
-    }
-
-    fn state_of(&self, motion: &Motion) -> State {
-        State {
-            x_m: self.radius_m * (motion.angle + motion.pitch),
-            x_dot_m_s: self.radius_m * (motion.speed + motion.pitch_rate),
-            pitch_rad: motion.pitch,
-            pitch_rate_rad_s: motion.pitch_rate,
+impl Motion {
+    #[inline]
+    fn moved(&self, rate: &Self, dt: f64) -> Self {
+        Self {
+            angle: self.angle + dt * rate.angle,
+            speed: self.speed + dt * rate.speed,
+            pitch: self.pitch + dt * rate.pitch,
+            pitch_rate: self.pitch_rate + dt * rate.pitch_rate,
         }
     }
 }
 
-fn stick_range(friction: &[Option<Stribeck>; 2]) -> Option<RangeNm> {
-    let sum = |end: fn(&RangeInclusive<f64>) -> f64| -> f64 {
-        friction.iter().flatten().map(|curve| end(&curve.stick_range_nm())).sum()
-    };
-    let range = RangeNm { low: sum(|range| *range.start()), high: sum(|range| *range.end()) };
-    (range.high > range.low).then_some(range)
+impl Laws {
+    fn new(parameters: &RobotParameters, friction: &[Option<Stribeck>; 2]) -> Self {
+        let curves = || friction.iter().flatten();
+        let low: f64 = curves().map(|curve| *curve.stick_range_nm().start()).sum();
+        let high: f64 = curves().map(|curve| *curve.stick_range_nm().end()).sum();
+        Self {
+            coefficients: parameters.coefficients(),
+            radius_m: parameters.wheel_radius_m,
+            per_radius: 1.0 / parameters.wheel_radius_m,
+            sliding: SlidingFriction::new(curves().copied()),
+            stick_range_nm: (high > low).then_some(low..=high),
+        }
+    }
+
+    /// q̈ and θ̈ of shafts that slide in `direction`, rad/s².
+    #[inline]
+    fn sliding(&self, loads: &Loads, motion: &Motion, direction: f64) -> (f64, f64) {
+        let friction = self.sliding.torque_nm(motion.speed, direction);
+        self.accelerations(loads, motion, loads.torque_nm - friction)
+    }
+
+    /// Friction summed over both motors, N m, that keeps q̈ = 0, and θ̈ under it, rad/s²: both
+    /// accelerations are linear in the shaft torque.
+    #[inline]
+    fn held(&self, loads: &Loads, motion: &Motion) -> (f64, f64) {
+        let (motor, pitch) = self.accelerations(loads, motion, 0.0);
+        let (motor_by_one, pitch_by_one) = self.accelerations(loads, motion, 1.0);
+        let shaft_nm = -motor / (motor_by_one - motor);
+        (loads.torque_nm - shaft_nm, pitch + shaft_nm * (pitch_by_one - pitch))
+    }
+
+    /// q̈ and θ̈ under the sum of the shaft torques after friction, rad/s².
+    #[inline]
+    fn accelerations(&self, loads: &Loads, motion: &Motion, shaft_nm: f64) -> (f64, f64) {
+        let (sin, cos) = loads.start.sin_cos(motion.pitch);
+        let along = shaft_nm + self.radius_m * loads.push_n;
+        let about = loads.push_height_m * cos * loads.push_n - shaft_nm;
+        let found = self.coefficients.accelerations((sin, cos), motion.pitch_rate, along, about);
+        (found.x_ddot_m_s2 * self.per_radius - found.pitch_accel_rad_s2, found.pitch_accel_rad_s2)
+    }
 }
+
+#[cfg(test)]
+mod tests;

@@ -185,7 +185,7 @@ impl Simulation {
         let push_n = if self.push_ticks_left > 0 { self.push_n } else { 0.0 };
         self.push_ticks_left = self.push_ticks_left.saturating_sub(1);
         let forcing = Forcing { torque_nm, push_n, push_height_m: self.push_height_m };
-        self.plant.advance(&forcing, TICK_S, self.settings.substeps as usize);
+        self.plant.advance(&forcing, TICK_S, self.settings.substeps);
         self.tick += 1;
         let state = self.plant.state();
         // A pitch that is not a number is a fall as well.
