@@ -1,6 +1,8 @@
 //! Identification.
 mod exp2;
+mod linear;
 mod parameters;
+mod polish;
 mod samples;
 mod search_box;
 mod swarm;

@@ -65,35 +65,33 @@ impl Samples {
         );
     }
 
-    /// For every pair u = (|q̇|/v_s)^ξ and exp(−u), both without unit.
-    pub(super) fn fade(
-        &self,
-        log2_stribeck_speed: f64,
-        exponent: f64,
-        power: &mut [f64],
-        fading: &mut [f64],
-    ) {
+    /// For every pair u = (|q̇|/v_s)^ξ, at most about 708, and exp(−u), both without unit.
+    pub(super) fn fade(&self, log2_stribeck_speed: f64, exponent: f64, power: &mut [f64], fading: &mut [f64]) {
         pulp::Arch::new().dispatch(
             #[inline(always)]
             || {
                 for ((x, u), s) in self.log2_speed.iter().zip(power).zip(fading) {
-                    let (bits, value) = fading_at(*x, log2_stribeck_speed, exponent);
-                    *u = bits * std::f64::consts::LN_2;
-                    *s = value;
+                    let bits = outer_bits(*x, log2_stribeck_speed, exponent);
+                    *u = std::f64::consts::LN_2 * if bits < 1022.0 { bits } else { 1022.0 };
+                    *s = exp2(-bits);
                 }
             },
         );
+    }
+
+    /// ln u for u = (|q̇|/v_s)^ξ of pair `i`.
+    pub(super) fn log_power(&self, i: usize, log2_stribeck_speed: f64, exponent: f64) -> f64 {
+        exponent * (self.log2_speed[i] - log2_stribeck_speed) * std::f64::consts::LN_2
     }
 }
 
 /// log₂(log₂ e): makes the outer power one of two as well.
 const OUTER: f64 = 0.528_766_372_944_897_6;
 
-/// u / ln 2 and exp(−u) for u = (|q̇|/v_s)^ξ.
+/// u / ln 2 for u = (|q̇|/v_s)^ξ, so that exp(−u) = 2^−(u / ln 2).
 #[inline(always)]
-fn fading_at(log2_speed: f64, log2_stribeck_speed: f64, exponent: f64) -> (f64, f64) {
-    let bits = exp2(exponent * (log2_speed - log2_stribeck_speed) + OUTER);
-    (bits, exp2(-bits))
+fn outer_bits(log2_speed: f64, log2_stribeck_speed: f64, exponent: f64) -> f64 {
+    exp2(exponent * (log2_speed - log2_stribeck_speed) + OUTER)
 }
 
 #[inline(always)]
@@ -102,7 +100,7 @@ fn sum_below(samples: &Samples, point: &Point, limit: f64) -> f64 {
     let drop = point[STATIC] - point[COULOMB];
     let mut lanes = [0.0; LANES];
     let mut squares = [0.0; STRIDE];
-    let mut power = [0.0; STRIDE];
+    let mut bits = [0.0; STRIDE];
     let mut start = 0;
     while start < samples.len() {
         let end = samples.len().min(start + STRIDE);
@@ -111,11 +109,12 @@ fn sum_below(samples: &Samples, point: &Point, limit: f64) -> f64 {
         let q = &samples.speed[start..end];
         let direction = &samples.direction[start..end];
         let torque = &samples.torque[start..end];
+        // Two loops: in one, the processor waits for the chain of both exponentials.
         for i in 0..count {
-            power[i] = exp2(point[EXPONENT] * (x[i] - log2_stribeck_speed) + OUTER);
+            bits[i] = outer_bits(x[i], log2_stribeck_speed, point[EXPONENT]);
         }
         for i in 0..count {
-            let s = exp2(-power[i]);
+            let s = exp2(-bits[i]);
             let level = (point[COULOMB] + drop * s) * direction[i];
             let error = level + ((point[VISCOUS] * q[i] + point[OFFSET]) - torque[i]);
             squares[i] = error * error;
@@ -126,8 +125,7 @@ fn sum_below(samples: &Samples, point: &Point, limit: f64) -> f64 {
             }
         }
         start = end;
-        let sum =
-            ((lanes[0] + lanes[4]) + (lanes[1] + lanes[5])) + ((lanes[2] + lanes[6]) + (lanes[3] + lanes[7]));
+        let sum = ((lanes[0] + lanes[4]) + (lanes[1] + lanes[5])) + ((lanes[2] + lanes[6]) + (lanes[3] + lanes[7]));
         // Written so that NaN, too, is no improvement.
         if !(sum < limit) {
             return limit;
