@@ -1,6 +1,9 @@
-//! Identification.
+//! Friction and inertia from logs.
+
 mod exp2;
+pub mod filter;
 mod linear;
+pub mod motion;
 mod parameters;
 mod polish;
 mod samples;

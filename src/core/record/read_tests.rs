@@ -1,5 +1,5 @@
 use super::*;
-use crate::record::{LogKind, write_log};
+use crate::record::LogKind;
 
 fn read(text: impl AsRef<[u8]>, map: &[&str]) -> Result<Log, LogError> {
     let entries = map.iter().map(|entry| entry.parse().unwrap()).collect();
