@@ -1,8 +1,13 @@
 //! What is wrong with a log, in plain sentences.
 
+mod clock;
+mod excitation;
+mod signals;
+mod units;
+
 use serde::Serialize;
 
-use super::Log;
+use super::{Log, LogError, LogKind, schema};
 
 /// How much a finding matters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -25,21 +30,96 @@ pub struct HealthFinding {
     pub column: String,
     /// What is wrong.
     pub problem: String,
-    /// What to do about it.
+    /// What to do about it; nothing where nothing has to be done.
     pub mend: String,
 }
 
-/// What is wrong with a log, the gravest first.
-pub fn data_health(log: &Log) -> Vec<HealthFinding> {
-    let mut findings = Vec::new();
-    if let Err(error) = log.kind() {
-        findings.push(HealthFinding {
-            severity: Severity::Error,
-            column: String::new(),
-            problem: error.to_string(),
-            mend: "map the file's own columns".to_owned(),
+/// The findings so far.
+#[derive(Default)]
+struct Findings(Vec<HealthFinding>);
+
+impl Findings {
+    fn add(&mut self, severity: Severity, column: &str, problem: impl Into<String>, mend: impl Into<String>) {
+        self.0.push(HealthFinding {
+            severity,
+            column: column.to_owned(),
+            problem: problem.into(),
+            mend: mend.into(),
         });
     }
+
+    fn info(&mut self, column: &str, problem: impl Into<String>) {
+        self.add(Severity::Info, column, problem, "");
+    }
+
+    fn warn(&mut self, column: &str, problem: impl Into<String>, mend: impl Into<String>) {
+        self.add(Severity::Warning, column, problem, mend);
+    }
+}
+
+/// What is wrong with a log, the gravest first.
+///
+/// Looks at completeness, dropped rows, the clock (rate, jitter, gaps, order), each column of the schema
+/// (missing values, held samples, steps, saturation, standstill, wrapped angles), units (degrees, revolutions,
+/// raw counts) and at what the motion excites. A log without faults has infos only.
+pub fn data_health(log: &Log) -> Vec<HealthFinding> {
+    let mut findings = Findings::default();
+    let kind = kind(log, &mut findings);
+    dropped_rows(log, &mut findings);
+    if log.rows() > 0 {
+        let row_s = clock::check(log, &mut findings);
+        for column in log.columns.iter().filter(|column| schema::is_known(&column.name)) {
+            signals::check(&column.name, &column.values, row_s, &mut findings);
+        }
+        units::check(log, row_s, &mut findings);
+        if let Some(kind) = kind {
+            excitation::check(log, kind, &mut findings);
+        }
+    }
+    let mut findings = findings.0;
     findings.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
     findings
 }
+
+fn kind(log: &Log, findings: &mut Findings) -> Option<LogKind> {
+    match log.kind() {
+        Ok(kind) => Some(kind),
+        Err(LogError::MissingColumns { kind, missing, example, .. }) => {
+            let problem = format!("a {kind} needs `{missing}`, which the log does not have");
+            let mend = format!("name the file's own column with --map {example}");
+            findings.add(Severity::Error, &missing, problem, mend);
+            None
+        }
+        Err(error) => {
+            findings.add(Severity::Error, "", error.to_string(), "read the log again");
+            None
+        }
+    }
+}
+
+fn dropped_rows(log: &Log, findings: &mut Findings) {
+    let Some(first) = log.problems.first() else { return };
+    let problem = format!(
+        "{} cells or rows could not be used and {} of {} rows were dropped, the first at {first}",
+        log.problem_count,
+        log.dropped_rows,
+        log.rows() + log.dropped_rows
+    );
+    findings.warn(&first.column, problem, "correct the file where it is damaged, or record it again");
+}
+
+fn finite(values: &[f64]) -> impl Iterator<Item = f64> + Clone + '_ {
+    values.iter().copied().filter(|value| value.is_finite())
+}
+
+/// Smallest and largest finite value.
+fn range(values: &[f64]) -> Option<[f64; 2]> {
+    finite(values).fold(None, |range, value| match range {
+        None => Some([value, value]),
+        Some([low, high]) => Some([low.min(value), high.max(value)]),
+    })
+}
+
+#[cfg(test)]
+#[path = "health/tests.rs"]
+mod tests;

@@ -17,6 +17,7 @@ mod error;
 mod health;
 mod map;
 mod plan;
+mod preview;
 mod read;
 pub mod schema;
 mod table;
@@ -27,8 +28,10 @@ mod write;
 pub use error::{LineProblem, LogError};
 pub use health::{HealthFinding, Severity, data_health};
 pub use map::{ColumnMap, MapError, Mapping};
+pub use preview::{ColumnSummary, Preview, preview};
 pub use read::{ReadOptions, ReadProgress, read_log};
 pub use schema::LogKind;
+pub use time::row_time_s;
 pub use write::write_log;
 
 /// One column of a log.

@@ -1,4 +1,18 @@
-//! Rows whose time does not follow.
+//! The clock of a log: usual time between rows, rows whose time does not follow.
+
+/// Usual time between the rows of a log, s: the mean of the steps that are no gaps (at most 2.5 times the
+/// median). Nothing where time does not rise.
+pub fn row_time_s(time_s: &[f64]) -> Option<f64> {
+    let steps = time_s.windows(2).map(|pair| pair[1] - pair[0]);
+    let mut steps: Vec<f64> = steps.filter(|step| step.is_finite() && *step > 0.0).collect();
+    let middle = steps.len() / 2;
+    if steps.is_empty() {
+        return None;
+    }
+    let median = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
+    steps.retain(|&step| step <= 2.5 * median);
+    Some(steps.iter().sum::<f64>() / steps.len() as f64)
+}
 
 /// Rows that have to go so that time rises strictly.
 #[derive(Debug, PartialEq)]
@@ -47,6 +61,16 @@ fn longest_rising(values: &[f64]) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn gaps_and_jitter_leave_the_usual_time_between_rows() {
+        let alternating: Vec<f64> = (0..100).map(|row| f64::from(row) + 0.4 * f64::from(row % 2)).collect();
+        let found = row_time_s(&alternating).unwrap();
+        assert!((found - 1.0).abs() < 0.01, "{found}");
+        assert_eq!(row_time_s(&[0.0, 1.0, 2.0, 50.0, 51.0, f64::NAN]), Some(1.0));
+        assert_eq!(row_time_s(&[1.0, 1.0]), None);
+        assert_eq!(row_time_s(&[]), None);
+    }
 
     #[test]
     fn as_few_rows_as_possible_go() {

@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use crate::identify::filter::{ZeroPhase, derivative};
+use crate::record::row_time_s;
 
 /// Highest cut-off of the position filter, Hz: faster than the friction and inertia of an axis are seen in
 /// practice, and what the published procedures on 1 kHz data use.
@@ -45,7 +46,8 @@ pub(super) fn stretches(time_s: &[f64], position: &[f64], effort: &[f64]) -> Vec
         .map(|row| [time_s[row], position[row], effort[row]])
         .filter(|row| row.iter().all(|value| value.is_finite()))
         .collect();
-    let step_s = median(rows.windows(2).map(|pair| pair[1][0] - pair[0][0]).collect());
+    let times: Vec<f64> = rows.iter().map(|row| row[0]).collect();
+    let step_s = row_time_s(&times).unwrap_or(f64::NAN);
     let longest = gap_s(step_s);
     rows.chunk_by(|a, b| (0.0..=longest).contains(&(b[0] - a[0])))
         .filter(|rows| rows.len() >= 4)
@@ -62,12 +64,7 @@ fn highest_cutoff_hz(step_s: f64) -> f64 {
     HIGHEST_CUTOFF_HZ.min(0.25 / step_s)
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
-}
-
-fn uniform(rows: &[[f64; 3]], median_step_s: f64) -> Stretch {
+fn uniform(rows: &[[f64; 3]], usual_step_s: f64) -> Stretch {
     let (start, end) = (rows[0][0], rows[rows.len() - 1][0]);
     let mean_step_s = (end - start) / (rows.len() - 1) as f64;
     let on_grid = |(index, row): (usize, &[f64; 3])| {
@@ -77,11 +74,11 @@ fn uniform(rows: &[[f64; 3]], median_step_s: f64) -> Stretch {
         let column = |index: usize| rows.iter().map(|row| row[index]).collect();
         return Stretch { step_s: mean_step_s, position: column(1), effort: column(2) };
     }
-    let count = ((end - start) / median_step_s) as usize + 1;
+    let count = ((end - start) / usual_step_s) as usize + 1;
     let (mut position, mut effort) = (Vec::with_capacity(count), Vec::with_capacity(count));
     let mut left = 0;
     for index in 0..count {
-        let time = (start + index as f64 * median_step_s).min(end);
+        let time = (start + index as f64 * usual_step_s).min(end);
         while left + 2 < rows.len() && rows[left + 1][0] <= time {
             left += 1;
         }
@@ -89,7 +86,7 @@ fn uniform(rows: &[[f64; 3]], median_step_s: f64) -> Stretch {
         position.push(cubic(rows, left, time));
         effort.push(rows[left][2] + share * (rows[left + 1][2] - rows[left][2]));
     }
-    Stretch { step_s: median_step_s, position, effort }
+    Stretch { step_s: usual_step_s, position, effort }
 }
 
 /// Position at a time between rows `left` and `left + 1`: a cubic whose slope at each row is between those of

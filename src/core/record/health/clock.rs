@@ -1,0 +1,87 @@
+//! The clock of a log.
+
+use super::{Findings, Severity};
+use crate::record::{Log, row_time_s};
+
+/// Reports on `time_s` and returns the usual time between rows, s, where there is one.
+pub(super) fn check(log: &Log, findings: &mut Findings) -> Option<f64> {
+    let time = log.column("time_s")?;
+    let steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).filter(|s| s.is_finite()).collect();
+    let mut sorted: Vec<f64> = steps.iter().copied().filter(|&step| step > 0.0).collect();
+    sorted.sort_by(f64::total_cmp);
+    order(&steps, findings);
+    let row_s = row_time_s(time)?;
+    let seconds = sorted.iter().sum::<f64>();
+    findings.info("time_s", format!("{} rows a second over {seconds:.3} s", Number(1.0 / row_s)));
+    rate(row_s, findings);
+    jitter(row_s, &sorted, findings);
+    gaps(row_s, time, findings);
+    Some(row_s)
+}
+
+/// A number with four significant digits.
+struct Number(f64);
+
+impl std::fmt::Display for Number {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        let digits = 3 - self.0.abs().max(1e-9).log10().floor() as i32;
+        let scale = 10_f64.powi(digits);
+        write!(f, "{}", (self.0 * scale).round() / scale)
+    }
+}
+
+fn order(steps: &[f64], findings: &mut Findings) {
+    let wrong = steps.iter().filter(|&&step| step <= 0.0).count();
+    if wrong > 0 {
+        let problem = format!("time repeats or runs back in {wrong} rows");
+        findings.add(Severity::Error, "time_s", problem, "sort the rows by time and keep one for each time");
+    }
+}
+
+fn rate(row_s: f64, findings: &mut Findings) {
+    let hz = 1.0 / row_s;
+    if row_s >= 0.5 {
+        let problem = format!("time rises by {row_s} s a row, as if it were in milliseconds or microseconds");
+        findings.warn("time_s", problem, "if so, read it with --map time_s=time_s*0.001 or *0.000001");
+    } else if hz < 45.0 {
+        let problem = format!("{:.1} rows a second are too few to see how friction acts", hz);
+        findings.warn("time_s", problem, "record 50 rows a second or more");
+    } else if hz > 11_000.0 {
+        let problem = format!("{:.0} rows a second are more than a motor's controller runs at", hz);
+        findings.warn("time_s", problem, "check the unit of the time");
+    }
+}
+
+fn jitter(row_s: f64, sorted: &[f64], findings: &mut Findings) {
+    let share = |quantile: f64| sorted[(quantile * (sorted.len() - 1) as f64) as usize] / row_s;
+    let (low, high) = (share(0.01), share(0.99));
+    let problem = format!(
+        "the time between rows jitters: from {:.0} % to {:.0} % of its mean in all but one row of fifty",
+        100.0 * low,
+        100.0 * high
+    );
+    if high - low > 0.4 {
+        findings.warn(
+            "time_s",
+            problem,
+            "stamp the rows where they are measured, not where they are written",
+        );
+    } else if high - low > 0.05 {
+        findings.info("time_s", problem);
+    }
+}
+
+fn gaps(row_s: f64, time: &[f64], findings: &mut Findings) {
+    let is_gap = |pair: &&[f64]| pair[1] - pair[0] > 5.5 * row_s;
+    let gaps: Vec<&[f64]> = time.windows(2).filter(is_gap).collect();
+    let longest = gaps.iter().max_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0])));
+    if let Some(longest) = longest {
+        let problem = format!(
+            "gaps of more than five rows: {}, the longest of {} s at {} s",
+            gaps.len(),
+            Number(longest[1] - longest[0]),
+            Number(longest[0])
+        );
+        findings.warn("time_s", problem, "the log is split there; look for lost messages or a busy recorder");
+    }
+}

@@ -1,0 +1,118 @@
+//! Each column on its own: missing values, held samples, steps, saturation, standstill, wraps.
+
+use std::f64::consts::TAU;
+
+use super::{Findings, finite, range};
+
+/// Reports on one column of the schema.
+pub(super) fn check(name: &str, values: &[f64], row_s: Option<f64>, findings: &mut Findings) {
+    missing(name, values, findings);
+    if name == "time_s" || row_s.is_none() {
+        return;
+    }
+    let Some([low, high]) = range(values) else { return };
+    let measured = !name.starts_with("target") && !name.contains("temperature") && !name.contains("voltage");
+    if low == high {
+        if measured {
+            findings.warn(
+                name,
+                format!("the value is {low} throughout"),
+                "check that the sensor is connected",
+            );
+        }
+        return;
+    }
+    let held = held_rows(values);
+    if let (2.., Some(row_s)) = (held, row_s) {
+        let hz = 1.0 / (held as f64 * row_s);
+        findings
+            .info(name, format!("each value is held for {held} rows, fresh about {hz:.0} times a second"));
+    }
+    if measured {
+        steps(name, values, high - low, findings);
+    }
+    if name.starts_with("torque") || name.starts_with("force") {
+        saturation(name, values, [low, high], held, findings);
+    }
+    if name.starts_with("motor_angle") {
+        wraps(name, values, findings);
+    }
+}
+
+fn missing(name: &str, values: &[f64], findings: &mut Findings) {
+    let absent = values.iter().filter(|value| !value.is_finite()).count();
+    if absent == values.len() {
+        findings.warn(name, "there is no number in this column", "remove the column or record it again");
+    } else if absent > 0 {
+        findings.info(name, format!("{absent} of {} rows have no value", values.len()));
+    }
+}
+
+/// Rows for which a value usually stays before it changes: the median over the runs of equal values.
+fn held_rows(values: &[f64]) -> usize {
+    let mut runs: Vec<usize> = values.chunk_by(|a, b| a == b).map(<[f64]>::len).collect();
+    // A rest or a saturated stretch is one long run; the runs of a slow sensor are many.
+    if runs.len() < 10 {
+        return 1;
+    }
+    let middle = runs.len() / 2;
+    *runs.select_nth_unstable(middle).1
+}
+
+/// Values that are multiples of a step that is coarse against the range.
+fn steps(name: &str, values: &[f64], range: f64, findings: &mut Findings) {
+    let differences =
+        || values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|&d| d > 1e-9 * range);
+    let step = differences().fold(f64::INFINITY, f64::min);
+    let count = range / step;
+    if !step.is_finite() || count > 20_000.0 {
+        return;
+    }
+    let whole = |difference: &f64| {
+        let steps = difference / step;
+        (steps - steps.round()).abs() < 0.1
+    };
+    let all = differences().count();
+    if differences().filter(whole).count() * 10 < all * 9 {
+        return;
+    }
+    let text = format!("the values come in steps of about {step:.3e}, {count:.0} over their range");
+    if count < 20.0 && all > 100 {
+        findings.warn(name, text, "use a finer sensor or a larger motion");
+    } else {
+        findings.info(name, text);
+    }
+}
+
+/// Flat tops: rows in runs at the largest or smallest value of a column that otherwise varies.
+fn saturation(name: &str, values: &[f64], [low, high]: [f64; 2], held: usize, findings: &mut Findings) {
+    let at = |limit: f64| {
+        let flat =
+            values.chunk_by(|a, b| a == b).filter(|run| run[0] == limit && run.len() >= 3.max(3 * held));
+        flat.map(<[f64]>::len).sum::<usize>()
+    };
+    let flat = at(high) + at(low);
+    let changes = values.windows(2).filter(|pair| pair[0] != pair[1]).count();
+    let varies = changes * 10 > values.len() / held;
+    if varies && flat * 200 > values.len() {
+        let problem = format!(
+            "{:.1} % of the rows stay at the limits {low} and {high}: the value is cut off there",
+            100.0 * flat as f64 / values.len() as f64
+        );
+        findings.warn(name, problem, "record the torque that really acts, or with less torque");
+    }
+}
+
+/// Jumps of whole turns: an encoder that starts again after each turn.
+fn wraps(name: &str, values: &[f64], findings: &mut Findings) {
+    let jump = |pair: &&[f64]| {
+        let turns = (pair[1] - pair[0]) / TAU;
+        turns.abs() > 0.9 && (turns - turns.round()).abs() < 0.1
+    };
+    let wrapped = values.windows(2).filter(jump).count();
+    let inside = finite(values).all(|angle| angle.abs() < 1.1 * TAU);
+    if wrapped > 0 && inside {
+        let problem = format!("the angle jumps by a whole turn {wrapped} times: it is given within one turn");
+        findings.warn(name, problem, "write the angle counted over turns");
+    }
+}

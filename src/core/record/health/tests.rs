@@ -1,0 +1,284 @@
+use std::f64::consts::PI;
+
+use super::*;
+
+/// A bench log without faults: a swept shaft with an encoder of 16 bits and noise in the torque.
+fn bench() -> Log {
+    let time: Vec<f64> = (0..4000).map(|row| f64::from(row) * 1e-3).collect();
+    let quantum = 2.0 * PI / 65536.0;
+    let angle = |t: f64| 6.0 * (2.0 * t).sin() + 2.0 * (7.0 * t).cos();
+    let speed = |t: f64| 12.0 * (2.0 * t).cos() - 14.0 * (7.0 * t).sin();
+    let noise = |t: f64| 0.01 * (1e5 * t * t).sin();
+    Log::from_columns(
+        "made.csv",
+        [
+            ("motor_angle_rad", time.iter().map(|&t| (angle(t) / quantum).round() * quantum).collect()),
+            ("motor_speed_rad_s", time.iter().map(|&t| speed(t) + 5.0 * noise(t)).collect()),
+            ("torque_nm", time.iter().map(|&t| 0.1 * (3.0 * t).sin() + noise(t)).collect()),
+            ("time_s", time),
+        ],
+    )
+}
+
+/// The log with one column changed.
+fn with(log: &Log, name: &str, change: impl Fn(usize, f64) -> f64) -> Log {
+    let mut log = log.clone();
+    let column = log.columns.iter_mut().find(|column| column.name == name).unwrap();
+    column.values.iter_mut().enumerate().for_each(|(row, value)| *value = change(row, *value));
+    log
+}
+
+#[test]
+fn a_log_without_faults_has_infos_only() {
+    let findings = data_health(&bench());
+    assert!(findings.iter().all(|finding| finding.severity == Severity::Info), "{findings:#?}");
+    assert!(findings.iter().any(|f| f.problem == "1000 rows a second over 3.999 s"), "{findings:#?}");
+}
+
+#[test]
+fn each_fault_is_named_with_its_column_and_mend() {
+    use Severity::{Error, Info, Warning};
+    let bench = bench();
+    for (log, severity, column, problem, mend) in [
+        (with(&bench, "time_s", |_, t| 1000.0 * t), Warning, "time_s", "in milliseconds", "time_s*0.001"),
+        (with(&bench, "time_s", |_, t| 30.0 * t), Warning, "time_s", "too few", "50 rows a second"),
+        (
+            with(&bench, "time_s", |_, t| t / 20.0),
+            Warning,
+            "time_s",
+            "20000 rows a second are more",
+            "unit of",
+        ),
+        (
+            with(&bench, "time_s", |row, t| t - 0.01 * f64::from(row == 50)),
+            Error,
+            "time_s",
+            "in 1 rows",
+            "sort",
+        ),
+        (
+            with(&bench, "time_s", |row, t| t + 0.2 * f64::from(row > 9)),
+            Warning,
+            "time_s",
+            "longest of 0.201 s at 0.009 s",
+            "split",
+        ),
+        (
+            with(&bench, "time_s", |row, t| t + 4e-4 * (row % 2) as f64),
+            Warning,
+            "time_s",
+            "jitters: from 60 % to 140 %",
+            "stamp",
+        ),
+        (
+            with(&bench, "motor_speed_rad_s", |_, w| w * 180.0 / PI),
+            Warning,
+            "motor_speed_rad_s",
+            "like degrees per second",
+            "motor_speed_rad_s*0.01745",
+        ),
+        (
+            with(&bench, "motor_speed_rad_s", |_, w| w * 30.0 / PI),
+            Warning,
+            "motor_speed_rad_s",
+            "revolutions per minute",
+            "*0.1047",
+        ),
+        (
+            with(&bench, "motor_angle_rad", |_, q| q * 180.0 / PI),
+            Warning,
+            "motor_speed_rad_s",
+            "the position in degrees",
+            "if the position is right",
+        ),
+        (
+            with(&bench, "motor_speed_rad_s", |_, w| -w),
+            Warning,
+            "motor_speed_rad_s",
+            "the opposite sign",
+            "*-1.00",
+        ),
+        (
+            with(&bench, "motor_speed_rad_s", |_, w| w / 6.33),
+            Warning,
+            "motor_speed_rad_s",
+            "revolutions per second",
+            "*6.3",
+        ),
+        (
+            with(&bench, "motor_speed_rad_s", |_, w| w * 3.0),
+            Warning,
+            "motor_speed_rad_s",
+            "gear ratio",
+            "*0.33",
+        ),
+        (
+            with(&bench, "torque_nm", |_, t| (t * 1000.0).round()),
+            Warning,
+            "torque_nm",
+            "whole number",
+            "FACTOR in N m",
+        ),
+        (
+            with(&bench, "torque_nm", |_, t| t * 1500.0),
+            Warning,
+            "torque_nm",
+            "milliamperes",
+            "torque_nm*0.001",
+        ),
+        (
+            with(&bench, "torque_nm", |_, t| t.clamp(-0.08, 0.08)),
+            Warning,
+            "torque_nm",
+            "stay at the limits -0.08 and 0.08",
+            "less torque",
+        ),
+        (with(&bench, "torque_nm", |_, _| 0.0), Warning, "torque_nm", "0 throughout", "connected"),
+        (with(&bench, "torque_nm", |_, _| f64::NAN), Warning, "torque_nm", "no number", "record it again"),
+        (
+            with(&bench, "torque_nm", |row, t| if row == 7 { f64::NAN } else { t }),
+            Info,
+            "torque_nm",
+            "1 of 4000 rows have no value",
+            "",
+        ),
+        (
+            with(&bench, "torque_nm", |_, t| (t * 50.0).round() / 50.0),
+            Warning,
+            "torque_nm",
+            "steps of about 2.000e-2",
+            "finer sensor",
+        ),
+        (
+            with(&bench, "motor_angle_rad", |_, q| q.rem_euclid(2.0 * PI)),
+            Warning,
+            "motor_angle_rad",
+            "by a whole turn",
+            "counted over turns",
+        ),
+        (
+            with(&bench, "motor_angle_rad", |row, _| row as f64 * 0.01),
+            Info,
+            "motor_angle_rad",
+            "one direction only",
+            "",
+        ),
+    ] {
+        let findings = data_health(&log);
+        let fits = |f: &&HealthFinding| {
+            (f.severity, f.column.as_str()) == (severity, column)
+                && f.problem.contains(problem)
+                && f.mend.contains(mend)
+        };
+        assert!(findings.iter().any(|f| fits(&f)), "{problem}: {findings:#?}");
+        let worse = findings.iter().filter(|f| f.severity > severity).count();
+        assert_eq!(worse, 0, "{problem}: {findings:#?}");
+    }
+}
+
+#[test]
+fn columns_held_by_a_slower_sensor_are_told() {
+    let bench = bench();
+    let torque = bench.column("torque_nm").unwrap().to_vec();
+    let held = with(&bench, "torque_nm", |row, _| torque[row / 10 * 10]);
+    let findings = data_health(&held);
+    let expected = "each value is held for 10 rows, fresh about 100 times a second";
+    assert!(findings.iter().any(|f| f.column == "torque_nm" && f.problem == expected), "{findings:#?}");
+}
+
+#[test]
+fn a_pitch_in_degrees_is_suspected() {
+    let log = Log::from_columns(
+        "r.csv",
+        [("time_s", vec![0.0, 0.001, 0.002]), ("pitch_rad", vec![0.5, -12.0, 3.0])],
+    );
+    let findings = data_health(&log);
+    let pitch = findings.iter().find(|f| f.severity == Severity::Warning && f.column == "pitch_rad").unwrap();
+    assert_eq!(pitch.problem, "values up to 12.0000 look like degrees");
+    assert_eq!(pitch.mend, "if so, read it with --map pitch_rad=pitch_rad*0.0174533");
+    // And the columns that a robot log needs besides are missing.
+    assert_eq!(findings[0].severity, Severity::Error);
+    assert!(findings[0].problem.starts_with("a robot log needs `x_m`, `x_dot_m_s`"), "{findings:#?}");
+}
+
+#[test]
+fn pairs_of_friction_are_judged_without_a_clock() {
+    let speeds: Vec<f64> = (-10..=10).filter(|&v| v != 0).map(f64::from).collect();
+    let pairs = |sign: f64, speeds: &[f64]| {
+        let torques = speeds.iter().map(|v| sign * (0.03 * v.signum() + 0.001 * v)).collect();
+        Log::from_columns("p.csv", [("speed_rad_s", speeds.to_vec()), ("torque_nm", torques)])
+    };
+    assert_eq!(data_health(&pairs(1.0, &speeds)), []);
+    assert!(data_health(&pairs(-1.0, &speeds))[0].mend.contains("torque_nm=torque_nm*-1"));
+    assert!(data_health(&pairs(1.0, &speeds[..5]))[0].problem.contains("5 pairs are few"));
+    assert!(data_health(&pairs(1.0, &speeds[10..]))[0].problem.contains("one sign only"));
+}
+
+#[test]
+fn dropped_rows_are_never_silent() {
+    let log = Log {
+        dropped_rows: 1,
+        problem_count: 2,
+        problems: vec![crate::record::LineProblem {
+            line: 7,
+            column: "torque_nm".into(),
+            problem: "bad".into(),
+        }],
+        ..bench()
+    };
+    let found = &data_health(&log)[0];
+    assert_eq!(found.severity, Severity::Warning);
+    assert_eq!(
+        found.problem,
+        "2 cells or rows could not be used and 1 of 4001 rows were dropped, the first at line 7, column \
+         `torque_nm`: bad"
+    );
+}
+
+/// A shared log and its findings, or nothing where the data are absent and not required.
+#[expect(clippy::disallowed_methods, reason = "measured data are read where they are at hand")]
+fn shared(name: &str, map: &[&str]) -> Option<Vec<HealthFinding>> {
+    use crate::record::{ColumnMap, ReadOptions, read_log};
+    let path = format!("{}/../../../shared/data/{name}", env!("CARGO_MANIFEST_DIR"));
+    let Ok(file) = std::fs::File::open(&path) else {
+        assert!(std::env::var_os("FLQR_REQUIRE_SHARED").is_none(), "{path} is absent");
+        println!("skipped: {path} is absent");
+        return None;
+    };
+    let map = ColumnMap::new(map.iter().map(|entry| entry.parse().unwrap()).collect()).unwrap();
+    let reader = std::io::BufReader::new(file);
+    let mut quiet = |_| std::ops::ControlFlow::Continue(());
+    Some(data_health(&read_log(reader, name, &ReadOptions::new(&map), &mut quiet).unwrap()))
+}
+
+#[test]
+fn simulated_logs_without_faults_have_infos_only() {
+    for name in ["example-clean", "example-balance", "example-bench"] {
+        for part in ["log", "heldout"] {
+            let Some(findings) = shared(&format!("undeclared/{name}/{part}.csv"), &[]) else { return };
+            assert!(findings.iter().all(|f| f.severity == Severity::Info), "{name}: {findings:#?}");
+        }
+    }
+    let Some(findings) = shared("emps/emps_standard.csv", &[]) else { return };
+    assert!(findings.iter().all(|f| f.severity == Severity::Info), "{findings:#?}");
+}
+
+/// What is odd about the measured logs, as their descriptions tell.
+#[test]
+fn oddities_of_measured_logs_are_found() {
+    let laas = ["motor_angle_rad=angle_rad", "motor_speed_rad_s=speed_rad_s", "torque_nm=current_a"];
+    for (name, column, problem) in [
+        ("laas_bldc/acc_current.csv", "time_s", "gaps of more than five rows"),
+        ("laas_bldc/acc_current.csv", "time_s", "jitters"),
+        ("laas_bldc/rolling_data1.csv", "motor_angle_rad", "one direction only"),
+        ("go1_pendulum/go1_m1kg_sin_sin.csv", "motor_speed_rad_s", "the speed is 0.15"),
+    ] {
+        let Some(findings) = shared(name, &laas[..if name.starts_with("go1") { 2 } else { 3 }]) else {
+            return;
+        };
+        assert!(
+            findings.iter().any(|f| f.column == column && f.problem.contains(problem)),
+            "{name}: {findings:#?}"
+        );
+    }
+}
