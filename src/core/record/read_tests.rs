@@ -242,7 +242,7 @@ fn files_that_are_no_logs_are_refused_with_place_and_mend() {
 
 /// A log of many rows, with a comment before every hundredth.
 fn long(rows: u32) -> String {
-    let row = |row: u32| format!("{}{}.5,{row},1\n", if row % 100 == 0 { "#\n" } else { "" }, row);
+    let row = |row: u32| format!("{}{}.5,{row},1\n", if row.is_multiple_of(100) { "#\n" } else { "" }, row);
     "time_s,motor_angle_rad,torque_nm\n".to_owned() + &(0..rows).map(row).collect::<String>()
 }
 

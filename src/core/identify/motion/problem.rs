@@ -24,7 +24,7 @@ const REST_SHARE: f64 = 0.03;
 
 /// Speeds of one stretch, from which the columns of friction are made.
 struct Moving {
-    stretch: Stretch,
+    step_s: f64,
     speed: Vec<f64>,
     /// The log that it comes from.
     sieve: usize,
@@ -42,6 +42,8 @@ pub(super) struct Problem {
     /// Columns in the order of [`place`], the shape's two of them for no Stribeck curve.
     columns: Vec<Vec<f64>>,
     effort: Vec<f64>,
+    /// Rows of sign(v), of which the shape's two columns are parts.
+    directions: Vec<f64>,
     values: [f64; place::ALL],
     free: [bool; place::ALL],
     shape: Option<Shape>,
@@ -66,6 +68,7 @@ impl Problem {
             moving: Vec::new(),
             columns: vec![Vec::new(); place::LINEAR],
             effort: Vec::new(),
+            directions: Vec::new(),
             values: known_values(known),
             free,
             shape: None,
@@ -120,8 +123,9 @@ impl Problem {
                 self.columns[index].extend(chosen(&sieve.rows(signal, step_s), &kept));
             }
             self.effort.extend(chosen(&sieve.rows(&stretch.effort, step_s), &kept));
-            self.moving.push(Moving { speed: motion.speed, stretch, sieve: self.sieves.len(), kept });
+            self.moving.push(Moving { step_s, speed: motion.speed, sieve: self.sieves.len(), kept });
         }
+        self.directions.clone_from(&self.columns[place::COULOMB]);
         self.columns[place::STATIC].resize(self.effort.len(), 0.0);
         self.sieves.push(sieve);
         Ok(())
@@ -166,15 +170,13 @@ impl Problem {
     }
 
     fn friction_columns(&self, shape: Shape) -> [Vec<f64>; 2] {
-        let (mut coulomb, mut sticking) = (Vec::new(), Vec::new());
-        for Moving { stretch, speed, sieve, kept } in &self.moving {
-            let sieve = &self.sieves[*sieve];
-            let parts = speed.iter().map(|&v| (direction(v), shape.fading(v)));
-            let low: Vec<f64> = parts.clone().map(|(sign, fading)| sign * fading).collect();
-            let rest: Vec<f64> = parts.map(|(sign, fading)| sign * (1.0 - fading)).collect();
-            coulomb.extend(chosen(&sieve.rows(&rest, stretch.step_s), kept));
-            sticking.extend(chosen(&sieve.rows(&low, stretch.step_s), kept));
+        let mut sticking = Vec::with_capacity(self.effort.len());
+        for Moving { step_s, speed, sieve, kept } in &self.moving {
+            let low: Vec<f64> = speed.iter().map(|&v| direction(v) * shape.fading(v)).collect();
+            sticking.extend(chosen(&self.sieves[*sieve].rows(&low, *step_s), kept));
         }
+        // Filters are linear: what does not fade is the rest of sign(v).
+        let coulomb = self.directions.iter().zip(&sticking).map(|(sign, low)| sign - low).collect();
         [coulomb, sticking]
     }
 
