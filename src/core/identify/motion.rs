@@ -38,6 +38,7 @@ use std::ops::ControlFlow;
 use serde::Serialize;
 
 use crate::friction::StribeckParameters;
+use crate::model_file::AxisModel;
 use crate::record::{Log, LogError, LogKind};
 use problem::Problem;
 
@@ -126,6 +127,27 @@ pub struct KnownAxis {
     pub friction: Option<StribeckParameters>,
     /// Load = this × sin(angle), N m; 0 on a linear axis.
     pub gravity_torque_nm: f64,
+}
+
+impl From<&AxisModel> for Axis {
+    fn from(model: &AxisModel) -> Self {
+        match model {
+            AxisModel::Rotary { .. } => Self::Rotary,
+            AxisModel::Linear { .. } => Self::Linear,
+        }
+    }
+}
+
+impl From<&AxisModel> for KnownAxis {
+    fn from(model: &AxisModel) -> Self {
+        let (inertia, gravity_torque_nm, friction) = match *model {
+            AxisModel::Rotary { inertia_kg_m2, gravity_torque_nm, friction } => {
+                (inertia_kg_m2, gravity_torque_nm, friction)
+            }
+            AxisModel::Linear { mass_kg, friction } => (mass_kg, 0.0, friction),
+        };
+        Self { inertia, friction: friction.map(|curve| *curve.parameters()), gravity_torque_nm }
+    }
 }
 
 /// One parameter of a fit.

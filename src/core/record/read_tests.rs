@@ -57,6 +57,12 @@ fn kinds_are_recognised() {
         assert_eq!(log.kind(), Ok(kind), "{columns}");
         assert!(log.serves(kind));
     }
+    let half = read("speed_rad_s,torque\n1,2\n", &[]).unwrap().kind().unwrap_err().to_string();
+    assert_eq!(
+        half,
+        "run.csv: a file of friction pairs needs `torque_nm`, the file has `speed_rad_s`, `torque`; name its own \
+         column with --map torque_nm=torque"
+    );
     // Samples of a motion are not pairs.
     let motion = read("time_s,speed_rad_s,torque_nm,angle_rad\n0,1,2,3\n", &[]).unwrap();
     assert_eq!(

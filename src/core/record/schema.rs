@@ -77,8 +77,12 @@ impl LogKind {
     }
 
     /// The kind that a file with these columns most probably was meant to be: the largest share of
-    /// required columns, the kind with fewer columns first. Time alone says nothing.
+    /// required columns, the kind with fewer columns first. Time alone says nothing; speeds without time are
+    /// pairs.
     pub(crate) fn nearest(has: impl Fn(&str) -> bool) -> Self {
+        if has("speed_rad_s") && !has("time_s") {
+            return Self::FrictionPairs;
+        }
         let share = |kind: Self| {
             let required = kind.required().iter().filter(|&&name| name != "time_s");
             let present = required.clone().filter(|name| has(name)).count();
