@@ -207,6 +207,7 @@ impl Problem {
         Some(residual(&columns, &solution, &target).iter().map(|r| r * r).sum())
     }
 
+    /// The fit.
     pub(super) fn solve(
         mut self,
         watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
@@ -228,14 +229,31 @@ impl Problem {
             self.set_shape(best);
             self.warn_of_shape(&span, best);
         }
-        if self.solve_linear().is_none() {
+        let mut left = self.solve_linear();
+        if left.is_some_and(|left| self.inertia_is_drowned(left)) {
+            self.give_up(place::INERTIA, "the acceleration is small and noisy");
+            left = self.solve_linear();
+        }
+        if left.is_none() || self.free_count() == 0 {
             return Err(MotionError::NothingExcited { files: self.files });
         }
         Ok(self.into_fit())
     }
 
-    /// Holds the inertia where the acceleration is noise.
-    fn give_up_on_noise(&mut self) {
+    /// Whether the inertia acts less than what is left (a sum of squares) while the acceleration is noisy: noise
+    /// that is not white, as a jittering clock makes it, can then hide it to any degree.
+    fn inertia_is_drowned(&self, left: f64) -> bool {
+        self.free[place::INERTIA] && self.noise_share() > NOISY && self.inertia_effect() < left
+    }
+
+    /// Sum of squares of the effort that accelerates the inertia.
+    fn inertia_effect(&self) -> f64 {
+        let acceleration = &self.columns[place::INERTIA];
+        self.values[place::INERTIA].powi(2) * acceleration.iter().map(|a| a * a).sum::<f64>()
+    }
+
+    /// Share of noise in the variance of the acceleration over all rows.
+    fn noise_share(&self) -> f64 {
         let mut power = 0.0;
         let mut noise = 0.0;
         let acceleration = &self.columns[place::INERTIA];
@@ -246,19 +264,13 @@ impl Problem {
             power += sum;
             noise += sum * self.sieves[*sieve].noise_share.min(1.0);
         }
-        let share = if power > 0.0 { noise / power } else { 1.0 };
-        if !self.free[place::INERTIA] || share < NOISY {
-            return;
-        }
-        let key = self.axis.keys()[place::INERTIA];
-        if share > NOISE_ONLY {
+        if power > 0.0 { noise / power } else { 1.0 }
+    }
+
+    /// Holds the inertia where the acceleration is noise.
+    fn give_up_on_noise(&mut self) {
+        if self.free[place::INERTIA] && self.noise_share() > NOISE_ONLY {
             self.give_up(place::INERTIA, "the acceleration is hardly more than noise of the position");
-        } else {
-            self.warnings.push(format!(
-                "noise of the position is {:.0} % of the acceleration's variance, so {key} comes out too low by \
-                 about as much: record stronger accelerations or a finer position",
-                100.0 * share
-            ));
         }
     }
 
@@ -419,9 +431,16 @@ impl Problem {
                 format!("{key} = {value:.3e} is not told from 0: record a motion in which it matters more")
             });
         }
-        let acceleration = &self.columns[place::INERTIA];
-        let rms = (acceleration.iter().map(|a| a * a).sum::<f64>() / acceleration.len() as f64).sqrt();
-        if self.free[place::INERTIA] && (self.values[place::INERTIA] * rms).abs() < rmse {
+        let share = self.noise_share();
+        if self.free[place::INERTIA] && share > NOISY {
+            self.warnings.push(format!(
+                "noise of the position is {:.0} % of the acceleration's variance, so {} comes out too low by about \
+                 as much: record stronger accelerations or a finer position",
+                100.0 * share,
+                keys[place::INERTIA]
+            ));
+        }
+        if self.free[place::INERTIA] && self.inertia_effect() < rmse * rmse * self.effort.len() as f64 {
             self.warnings.push(format!(
                 "{} acts less than what the model leaves unexplained, and noise would make it come out too low: \
                  record a motion with strong accelerations",

@@ -103,6 +103,16 @@ fn both_halves_of_a_jittered_log_give_the_same_motor() {
     }
 }
 
+/// A shaft that spins steadily: its inertia, 0.19 mA s²/rad by the log above, is not told, and is not told wrongly.
+#[test]
+fn a_steady_spin_with_a_jittered_clock_leaves_the_inertia_out() {
+    let map = ["motor_angle_rad=angle_rad", "torque_nm=current_a"];
+    let Some(log) = measured("laas_bldc/rolling_data1.csv", &map) else { return };
+    let found = fit(&[log], Axis::Rotary, None, &[]);
+    assert_eq!(found.parameter("inertia_kg_m2"), None, "{found:#?}");
+    assert!(found.warnings.iter().any(|warning| warning.contains("small and noisy")), "{found:#?}");
+}
+
 /// Left motor of the paper's Table 4.
 const PAPER_LEFT: StribeckParameters = StribeckParameters {
     coulomb_nm: 0.0338,
