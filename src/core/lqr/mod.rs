@@ -2,8 +2,6 @@
 
 mod balance;
 mod care;
-#[cfg(test)]
-mod carex;
 mod checks;
 mod design;
 mod diagnosis;
@@ -17,6 +15,8 @@ mod real;
 mod search;
 mod sign;
 mod square;
+#[cfg(test)]
+mod tests;
 mod weights;
 
 pub use care::{CareInput, CareSolution, solve_care};

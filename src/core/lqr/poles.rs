@@ -114,9 +114,8 @@ fn reduce_to_hessenberg<M: Square>(matrix: &mut M) {
     let mut v = matrix.zeros();
     for column in 0..size.saturating_sub(2) {
         let top = column + 1;
-        let others = (top + 1..size).fold(M::Scalar::ZERO, |sum, row| {
-            sum + matrix.at(row, column) * matrix.at(row, column)
-        });
+        let others = (top + 1..size)
+            .fold(M::Scalar::ZERO, |sum, row| sum + matrix.at(row, column) * matrix.at(row, column));
         if others.to_f64() == 0.0 {
             continue;
         }
@@ -139,15 +138,15 @@ fn reflect<M: Square>(matrix: &mut M, v: &[M::Scalar], top: usize, beta: M::Scal
     let size = matrix.size();
     for column in top - 1..size {
         let along = (top..size).fold(M::Scalar::ZERO, |sum, row| sum + v[row] * matrix.at(row, column));
-        for row in top..size {
-            let entry = matrix.at(row, column) - v[row] * (beta * along);
+        for (row, part) in v.iter().enumerate().skip(top) {
+            let entry = matrix.at(row, column) - *part * (beta * along);
             matrix.set(row, column, entry);
         }
     }
     for row in 0..size {
         let along = (top..size).fold(M::Scalar::ZERO, |sum, column| sum + v[column] * matrix.at(row, column));
-        for column in top..size {
-            let entry = matrix.at(row, column) - v[column] * (beta * along);
+        for (column, part) in v.iter().enumerate().skip(top) {
+            let entry = matrix.at(row, column) - *part * (beta * along);
             matrix.set(row, column, entry);
         }
     }
@@ -238,4 +237,74 @@ fn shifts<M: Square>(matrix: &M, end: usize, exceptional: bool) -> (M::Scalar, M
         return (shifted + shifted, shifted * shifted + (size * size).scaled(0.4375));
     }
     (a + d, a * d - b * c)
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DMatrix;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::super::double_double::DoubleDouble;
+    use super::super::square::{Square4, SquareN};
+    use super::*;
+
+    fn of(size: usize, entry: impl Fn(usize, usize) -> f64) -> Vec<Complex<f64>> {
+        let matrix = SquareN::from_fn(size, entry);
+        let (mut double, mut exact) = (vec![Complex::default(); size], vec![Complex::default(); size]);
+        eigenvalues(matrix.clone(), &mut double).unwrap();
+        eigenvalues(matrix.map(DoubleDouble::from), &mut exact).unwrap();
+        assert!(gap(&double, &exact) < 1e-7, "{double:?} {exact:?}");
+        exact
+    }
+
+    /// Largest distance from one of `found` to the nearest of `expected` that is not taken yet.
+    fn gap(found: &[Complex<f64>], expected: &[Complex<f64>]) -> f64 {
+        let mut rest = expected.to_vec();
+        found.iter().fold(0.0, |largest: f64, value| {
+            let distance = |other: &Complex<f64>| (other - value).norm();
+            let nearest = (0..rest.len()).min_by(|&i, &j| distance(&rest[i]).total_cmp(&distance(&rest[j])));
+            largest.max(distance(&rest.swap_remove(nearest.unwrap())))
+        })
+    }
+
+    #[test]
+    fn cyclic_permutations_have_the_roots_of_unity() {
+        for size in 1..=12 {
+            let found = of(size, |i, j| f64::from(u8::from((i + 1) % size == j)));
+            let root = |k: usize| Complex::from_polar(1.0, std::f64::consts::TAU * k as f64 / size as f64);
+            let expected: Vec<_> = (0..size).map(root).collect();
+            assert!(gap(&found, &expected) < 1e-14, "{found:?}");
+        }
+    }
+
+    #[test]
+    fn triangular_and_defective_matrices_have_their_diagonal() {
+        let found = of(5, |i, j| if i == j { i as f64 - 2.0 } else { f64::from(u8::from(i < j)) });
+        assert!(gap(&found, &[-2.0, -1.0, 0.0, 1.0, 2.0].map(Complex::from)) < 1e-15);
+        let jordan = of(6, |i, j| f64::from(u8::from(i + 1 == j)));
+        assert_eq!(jordan, vec![Complex::default(); 6]);
+    }
+
+    #[test]
+    fn random_matrices_agree_with_nalgebra() {
+        let mut generator = ChaCha8Rng::seed_from_u64(3);
+        for size in [2, 3, 4, 4, 7, 15] {
+            let entries: Vec<f64> = (0..size * size).map(|_| generator.random_range(-1.0..1.0)).collect();
+            let found = of(size, |i, j| entries[i * size + j]);
+            let peer = DMatrix::from_row_slice(size, size, &entries).complex_eigenvalues();
+            assert!(gap(&found, peer.as_slice()) < 1e-12);
+            if let Ok(stack) = <[f64; 16]>::try_from(entries) {
+                let mut poles = [Complex::default(); 4];
+                eigenvalues(Square4(stack), &mut poles).unwrap();
+                assert!(gap(&poles, &found) < 1e-13);
+            }
+        }
+    }
+
+    #[test]
+    fn not_a_number_has_no_eigenvalues() {
+        let matrix = SquareN::from_fn(3, |_, _| f64::NAN);
+        assert!(eigenvalues(matrix, &mut [Complex::default(); 3]).is_none());
+    }
 }

@@ -28,8 +28,8 @@ const WORTH_A_WARNING: f64 = 1e-9;
 const USELESS: f64 = 1e-2;
 /// Newton steps at most; from far away each halves the error.
 const NEWTON_STEPS: usize = 80;
-/// Largest residual, relative to the equation's terms, of a P whose stability cannot be proved.
-const LIMIT_RESIDUAL: f64 = 1e-13;
+/// Largest relative residual of a P whose stability cannot be proved.
+const LIMIT_RESIDUAL: f64 = 1e-11;
 /// Largest distance to the imaginary axis, relative to the norm of A − GP, of a pole that counts as on it.
 const ON_AXIS: f64 = 1e-7;
 
@@ -55,7 +55,7 @@ pub(super) fn find(equation: &Equation<DoubleDouble>) -> Option<Found> {
     if let Some(p) = double(&in_double(equation), shift, Rest { change: 1e-9, steps: 60 }) {
         let quick = refine::<f64>(equation, p.map(Into::into), SLOW);
         if quick.stable && quick.error <= NEGLIGIBLE {
-            return accept(equation, quick);
+            return accept(equation, quick, quick_poles);
         }
         candidates.push(refine::<DoubleDouble>(equation, quick.p, STAGNANT));
     }
@@ -75,7 +75,7 @@ pub(super) fn find(equation: &Equation<DoubleDouble>) -> Option<Found> {
         let ((group, error), (other_group, other_error)) = (rank(one), rank(other));
         group.cmp(&other_group).then(error.total_cmp(&other_error))
     });
-    candidates.into_iter().find_map(|candidate| accept(equation, candidate))
+    candidates.into_iter().find_map(|candidate| accept(equation, candidate, exact_poles))
 }
 
 /// Doubling in double-double, with another shift where the first meets a singular matrix.
@@ -87,10 +87,10 @@ fn doubled(equation: &Equation<DoubleDouble>) -> Option<Exact> {
 
 /// Newton's method with residuals in double-double and corrections in `T`, until they are negligible or
 /// contract by no more than `slow`.
-fn refine<T: Real>(equation: &Equation<DoubleDouble>, start: Exact, slow: f64) -> Candidate
+fn refine<T>(equation: &Equation<DoubleDouble>, start: Exact, slow: f64) -> Candidate
 where
+    T: Real + Into<DoubleDouble>,
     DoubleDouble: Into<T>,
-    T: Into<DoubleDouble>,
 {
     let mut candidate = Candidate { p: start, error: f64::INFINITY, stable: false };
     for _ in 0..NEWTON_STEPS {
@@ -115,8 +115,12 @@ where
     candidate
 }
 
-/// Judges a candidate by poles and residual.
-fn accept(equation: &Equation<DoubleDouble>, candidate: Candidate) -> Option<Found> {
+/// Judges a candidate by the poles that `poles` finds and by its residual.
+fn accept(
+    equation: &Equation<DoubleDouble>,
+    candidate: Candidate,
+    poles: fn(&Exact) -> Option<Vec<Complex<f64>>>,
+) -> Option<Found> {
     let closed_loop = equation.closed_loop(&candidate.p);
     let poles = poles(&closed_loop)?;
     let mut warnings = Vec::new();
@@ -139,28 +143,29 @@ fn accept(equation: &Equation<DoubleDouble>, candidate: Candidate) -> Option<Fou
         return None;
     }
     warnings.push(format!(
-        "poles on the imaginary axis (real part {rightmost:.1e}): p is the limit of stabilising solutions, the \
-         closed loop is not asymptotically stable"
+        "poles on the imaginary axis to rounding (real part {rightmost:.1e}): the closed loop is not \
+         asymptotically stable, and p solves the equation but need not be the only p that does so"
     ));
     Some(Found { p: candidate.p, poles, warnings })
 }
 
-/// ‖residual‖ over the sum of the norms of its terms.
+/// ‖residual‖ over the norms of Q and PGP. Not over those of PA: a huge P with PA + AᵀP = 0 drowns any Q.
 fn relative_residual(equation: &Equation<DoubleDouble>, p: &Exact) -> f64 {
-    let drift = p.times(&equation.a).norm();
-    let quadratic = p.times(&equation.g.times(p)).norm();
-    let terms = 2.0 * drift + quadratic + equation.q.norm();
+    let terms = p.times(&equation.g.times(p)).norm() + equation.q.norm();
     equation.residual(p).norm() / terms.max(f64::MIN_POSITIVE)
 }
 
-/// Poles of the closed loop, in double-double where double cannot tell their side of the axis.
-fn poles(closed_loop: &Exact) -> Option<Vec<Complex<f64>>> {
+/// Poles by the QR algorithm in double, or in double-double where double cannot tell their side of the axis.
+fn quick_poles(closed_loop: &Exact) -> Option<Vec<Complex<f64>>> {
     let mut poles = vec![Complex::default(); closed_loop.size()];
-    let doubtful = 1e4 * f64::EPSILON * closed_loop.norm();
     eigenvalues(closed_loop.map(Real::to_f64), &mut poles)?;
-    if poles.iter().any(|pole| pole.re >= -doubtful) {
-        eigenvalues(closed_loop.clone(), &mut poles)?;
-    }
+    let doubtful = -1e4 * f64::EPSILON * closed_loop.norm();
+    if poles.iter().all(|pole| pole.re < doubtful) { Some(poles) } else { exact_poles(closed_loop) }
+}
+
+fn exact_poles(closed_loop: &Exact) -> Option<Vec<Complex<f64>>> {
+    let mut poles = vec![Complex::default(); closed_loop.size()];
+    eigenvalues(closed_loop.clone(), &mut poles)?;
     Some(poles)
 }
 

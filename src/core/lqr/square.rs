@@ -200,8 +200,7 @@ impl Square for Square4 {
     fn inverse(self) -> Option<Self> {
         let m = &self.0;
         let (s, c) = (minors(m, 0), minors(m, 8));
-        let determinant =
-            s[0] * c[5] - s[1] * c[4] + s[2] * c[3] + s[3] * c[2] - s[4] * c[1] + s[5] * c[0];
+        let determinant = s[0] * c[5] - s[1] * c[4] + s[2] * c[3] + s[3] * c[2] - s[4] * c[1] + s[5] * c[0];
         let scale = 1.0 / determinant;
         if !scale.is_finite() {
             return None;

@@ -6,9 +6,8 @@ use std::fs;
 use nalgebra::DMatrix;
 use serde_json::Value;
 
-use super::double_double::DoubleDouble;
-use super::real::Real;
-use super::{CareInput, solve_care};
+use super::{decimal, relative_error};
+use crate::lqr::{CareInput, solve_care};
 
 /// The peers' best is taken as no better than half a unit in the last place.
 const ROUNDING: f64 = 1.1e-16;
@@ -49,15 +48,7 @@ fn error_of(example: &Value) -> f64 {
     assert_eq!(weighted.warnings.len(), usize::from(axis), "{:?}", weighted.warnings);
     assert!(axis || weighted.poles.iter().all(|pole| pole.re < 0.0));
     let reference = &example["P_ref"];
-    let (mut squares, mut norm) = (0.0, 0.0);
-    for i in 0..a.nrows() {
-        for j in 0..a.nrows() {
-            let expected = decimal(reference[i][j].as_str().unwrap());
-            squares += (DoubleDouble::from(weighted.p[(i, j)]) - expected).to_f64().powi(2);
-            norm += expected.to_f64().powi(2);
-        }
-    }
-    (squares / norm).sqrt()
+    relative_error(&weighted.p, |i, j| decimal(reference[i][j].as_str().unwrap()))
 }
 
 fn best_peer(example: &Value) -> f64 {
@@ -70,23 +61,4 @@ fn matrix(rows: &Value) -> DMatrix<f64> {
     let rows = rows.as_array().unwrap();
     let columns = rows[0].as_array().unwrap().len();
     DMatrix::from_fn(rows.len(), columns, |i, j| rows[i][j].as_f64().unwrap())
-}
-
-/// A decimal number to 32 digits.
-fn decimal(text: &str) -> DoubleDouble {
-    let (digits, exponent) = text.split_once('e').unwrap_or((text, "0"));
-    let mut exponent: i32 = exponent.parse().unwrap();
-    let mut value = DoubleDouble::ZERO;
-    let mut fraction = false;
-    for digit in digits.trim_start_matches('-').chars() {
-        if digit == '.' {
-            fraction = true;
-            continue;
-        }
-        value = value * DoubleDouble::from(10.0) + DoubleDouble::from(f64::from(digit.to_digit(10).unwrap()));
-        exponent -= i32::from(fraction);
-    }
-    let ten = (0..exponent.abs()).fold(DoubleDouble::ONE, |power, _| power * DoubleDouble::from(10.0));
-    let size = if exponent < 0 { value / ten } else { value * ten };
-    if digits.starts_with('-') { -size } else { size }
 }
