@@ -99,10 +99,34 @@ pub enum DesignError {
     },
 }
 
-/// A real eigenvalue without its imaginary zero, and zero without a sign.
+/// An eigenvalue in few digits; a real one without its imaginary zero.
 fn text(eigenvalue: &Complex<f64>) -> String {
-    match (eigenvalue.re + 0.0, eigenvalue.im) {
-        (real, 0.0) => real.to_string(),
-        _ => eigenvalue.to_string(),
+    let imaginary = number(eigenvalue.im.abs());
+    match (number(eigenvalue.re), eigenvalue.im) {
+        (real, 0.0) => real,
+        (real, above) if above > 0.0 => format!("{real}+{imaginary}i"),
+        (real, _) => format!("{real}-{imaginary}i"),
+    }
+}
+
+fn number(value: f64) -> String {
+    if value == 0.0 || (1e-3..1e6).contains(&value.abs()) {
+        // + 0.0 takes the sign from a negative zero.
+        return format!("{:.4}", value + 0.0).trim_end_matches('0').trim_end_matches('.').to_owned();
+    }
+    format!("{value:.1e}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn eigenvalues_are_written_in_few_digits() {
+        let written = |re: f64, im: f64| text(&Complex::new(re, im));
+        assert_eq!(written(-0.0, 0.0), "0");
+        assert_eq!(written(0.500_000_000_000_000_4, 0.0), "0.5");
+        assert_eq!(written(8.6e-18, -3.0), "8.6e-18-3i");
+        assert_eq!(written(100.0, 2.25), "100+2.25i");
     }
 }

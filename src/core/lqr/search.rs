@@ -124,7 +124,7 @@ fn accept(
     let closed_loop = equation.closed_loop(&candidate.p);
     let poles = poles(&closed_loop)?;
     let mut warnings = Vec::new();
-    if candidate.stable {
+    if candidate.stable && poles.iter().all(|pole| pole.re < 0.0) {
         if candidate.error > USELESS {
             return None;
         }

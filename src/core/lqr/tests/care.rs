@@ -1,6 +1,8 @@
 //! The general solver: references of 32 digits, refusals, warnings.
 
 use nalgebra::{Complex, DMatrix};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 
 use super::{decimal, relative_error};
 use crate::lqr::{CareError, CareInput, CareSolution, solve_care};
@@ -223,6 +225,49 @@ fn extreme_numbers_are_solved_or_refused() {
                 let found = solution.p[(0, 0)];
                 assert!((found / expected - 1.0).abs() < 1e-14, "{a} {b} {q} {r}: {found} {expected}");
             }
+        }
+    }
+}
+
+/// A mode that the input (`reached` false) or the cost (true) misses but for the rounding of a rotation.
+fn with_lost_mode(generator: &mut ChaCha8Rng, n: usize, eigenvalue: f64, reached: bool) -> [DMatrix<f64>; 3] {
+    let mut random = |rows: usize, columns: usize| {
+        DMatrix::from_fn(rows, columns, |_, _| generator.random_range(-1.0..1.0))
+    };
+    let (turn, mut a, mut b, mut c) = (random(n, n).qr().q(), random(n, n), random(n, 1), random(1, n));
+    for other in 1..n {
+        a[if reached { (other, 0) } else { (0, other) }] = 0.0;
+    }
+    a[(0, 0)] = eigenvalue;
+    *(if reached { &mut c[(0, 0)] } else { &mut b[(0, 0)] }) = 0.0;
+    let c = c * turn.transpose();
+    [&turn * a * turn.transpose(), &turn * b, c.transpose() * c]
+}
+
+/// Outcome first: what is returned is stable or says that it is not; what is refused is named.
+#[test]
+fn modes_lost_to_rounding_are_solved_warned_of_or_refused_but_never_silent() {
+    let mut generator = ChaCha8Rng::seed_from_u64(5);
+    for case in 0..80 {
+        let (n, reached, eigenvalue) = (2 + case % 5, case % 2 == 0, if case < 40 { 0.5 } else { 0.0 });
+        let [a, b, q] = with_lost_mode(&mut generator, n, eigenvalue, reached);
+        let outcome = solve_care(&a, &q, CareInput::Weighted { b: &b, r: &DMatrix::identity(1, 1) });
+        let stable = |solution: &CareSolution| solution.poles.iter().all(|pole| pole.re < 0.0);
+        match outcome {
+            // An unstable mode may cost nothing; the closed loop mirrors it.
+            Ok(solution) if reached && eigenvalue > 0.0 => {
+                assert!(stable(&solution) && solution.warnings.is_empty());
+                assert!(solution.poles.iter().any(|pole| (pole + eigenvalue).norm() < 1e-9), "{case}");
+            }
+            Ok(solution) => {
+                assert!(eigenvalue == 0.0, "{case}: an unstable mode out of reach was solved");
+                assert!(solution.relative_residual < 1e-12, "{case}: {:e}", solution.relative_residual);
+                assert!(!solution.warnings.is_empty() || (reached && stable(&solution)), "{case}");
+            }
+            Err(CareError::NotStabilisable { eigenvalue: found }) => {
+                assert!(!reached && (found - eigenvalue).norm() < 1e-12, "{case}: {found}");
+            }
+            Err(other) => panic!("{case}: {other}"),
         }
     }
 }
