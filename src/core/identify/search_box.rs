@@ -1,7 +1,7 @@
 //! Where the searches look: the permissible range [x_min, x_max] of Algorithm 1.
 
 use super::FrictionPair;
-use super::parameters::{OFFSET, Point};
+use super::parameters::{OFFSET, SPEED};
 
 /// Which ranges to search.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -41,7 +41,7 @@ impl SearchBox {
             lower: [0.0, 0.0, slowest / 20.0, 0.05, 0.0, -2.0 * torque],
             upper: [5.0 * torque, 15.0 * torque, fastest / 5.0, 2.2, 5.0 * torque / fastest, 2.0 * torque],
         };
-        found.upper[super::parameters::SPEED] = (fastest / 5.0).max(slowest);
+        found.upper[SPEED] = (fastest / 5.0).max(slowest);
         if one_direction(pairs) {
             found.lower[OFFSET] = 0.0;
             found.upper[OFFSET] = 0.0;
@@ -55,13 +55,6 @@ impl SearchBox {
         Self { lower: [0.01, 0.01, 1e-9, 1e-9, 0.01, -10.0], upper: [3.0, 10.0, 10.0, 2.2, 10.0, 10.0] }
     }
 
-    pub(super) fn new(bounds: Bounds, pairs: &[FrictionPair]) -> Self {
-        match bounds {
-            Bounds::Data => Self::from_pairs(pairs),
-            Bounds::Paper => Self::paper(),
-        }
-    }
-
     pub(super) fn width(&self, d: usize) -> f64 {
         self.upper[d] - self.lower[d]
     }
@@ -69,10 +62,6 @@ impl SearchBox {
     /// Whether every coordinate of a point is inside.
     pub fn contains(&self, point: &[f64; 6]) -> bool {
         (0..6).all(|d| (self.lower[d]..=self.upper[d]).contains(&point[d]))
-    }
-
-    pub(super) fn clamp(&self, point: &Point) -> Point {
-        std::array::from_fn(|d| point[d].clamp(self.lower[d], self.upper[d]))
     }
 }
 

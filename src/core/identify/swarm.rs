@@ -139,11 +139,6 @@ impl Pso {
         &self.global_best
     }
 
-    #[cfg(test)]
-    fn positions(&self) -> &[Point] {
-        &self.positions
-    }
-
     fn move_particles(&mut self) {
         let settings = self.settings;
         let remaining = (settings.iterations - self.iteration) as f64 / settings.iterations as f64;
@@ -211,4 +206,82 @@ fn smallest(numbers: &[f64]) -> usize {
 /// Uniform in [0, 1) with 53 bits; written out so that it stays the same whatever a random library does.
 fn uniform(random: &mut ChaCha8Rng) -> f64 {
     (random.next_u64() >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identify::test_data::{LEFT, even_pairs};
+
+    fn swarm(seed: u64) -> Pso {
+        let pairs = even_pairs(&LEFT, 60, 0.002, 1);
+        let settings = PsoSettings { particles: 24, iterations: 60, ..PsoSettings::default() };
+        Pso::new(&pairs, SearchBox::from_pairs(&pairs), settings, seed)
+    }
+
+    #[test]
+    fn particles_stay_inside_and_the_best_error_never_rises() {
+        for seed in 0..5 {
+            let mut swarm = swarm(seed);
+            let mut last = swarm.progress().best_error_nm;
+            let range = swarm.range;
+            for iteration in 1.. {
+                assert!(swarm.positions.iter().all(|x| range.contains(x)), "seed {seed}, iteration {iteration}");
+                let Some(step) = swarm.next() else { break };
+                assert_eq!(step.iteration, iteration);
+                assert!(step.best_error_nm <= last);
+                last = step.best_error_nm;
+            }
+            assert_eq!(swarm.progress().iteration, 60);
+        }
+    }
+
+    /// The rule for a coordinate that would leave its range: back, velocity inverted, moved again.
+    #[test]
+    fn a_coordinate_that_would_leave_turns_round() {
+        let swarm = swarm(1);
+        let (low, width) = (swarm.range.lower[0], swarm.range.width(0));
+        let (x, v) = swarm.stepped(0, low + 0.1 * width, -0.5 * width);
+        assert!((x - (low + 0.4 * width)).abs() < 1e-15 && v == 0.5 * width);
+        let (x, v) = swarm.stepped(0, low + 0.6 * width, 0.5 * width);
+        assert!((x - (low + 0.9 * width)).abs() < 1e-15 && v == 0.5 * width);
+    }
+
+    #[test]
+    fn the_seed_decides_every_byte() {
+        let history = |seed| swarm(seed).map(|step| step.best_error_nm.to_bits()).collect::<Vec<_>>();
+        assert_eq!(history(7), history(7));
+        assert_ne!(history(7), history(8));
+    }
+
+    /// The sum that a particle is judged by must be the sum over Eq. 28, also where it was given up early.
+    #[test]
+    fn the_best_error_is_that_of_the_curve() {
+        let pairs = even_pairs(&LEFT, 60, 0.002, 1);
+        let best = swarm(3).last().unwrap();
+        let curve = crate::friction::Stribeck::new(best.best).unwrap();
+        let squares: f64 =
+            pairs.iter().map(|p| (curve.torque_nm(p.speed_rad_s) - p.torque_nm).powi(2)).sum();
+        let expected = (squares / pairs.len() as f64).sqrt();
+        assert!((best.best_error_nm / expected - 1.0).abs() < 1e-12);
+    }
+
+    /// Contradiction of the paper: fitness below a threshold; read as error below it, twice in a row.
+    #[test]
+    fn stops_after_two_iterations_below_the_threshold() {
+        let pairs = even_pairs(&LEFT, 60, 0.002, 1);
+        let settings = PsoSettings { error_threshold: 1.0, ..PsoSettings::default() };
+        let mut swarm = Pso::new(&pairs, SearchBox::from_pairs(&pairs), settings, 1);
+        assert_eq!(swarm.by_ref().count(), 2);
+        assert!(swarm.reached_threshold());
+    }
+
+    #[test]
+    fn nothing_to_search_ends_at_once() {
+        let range = SearchBox::paper();
+        assert_eq!(Pso::new(&[], range, PsoSettings::default(), 1).count(), 0);
+        let pairs = even_pairs(&LEFT, 60, 0.0, 1);
+        let none = PsoSettings { particles: 0, ..PsoSettings::default() };
+        assert_eq!(Pso::new(&pairs, range, none, 1).count(), 0);
+    }
 }

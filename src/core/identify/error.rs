@@ -1,0 +1,92 @@
+//! Why a fit is refused.
+
+use crate::record::LogError;
+
+/// Why no fit could be made; each says what, where and the mend.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum FitError {
+    /// Nothing to fit.
+    #[error("no log was given, name at least one")]
+    NoLogs,
+    /// A log lacks columns.
+    #[error(transparent)]
+    Log(#[from] LogError),
+    /// A number that is none.
+    #[error("{file}: pair {row} has the value {value} in `{column}`, remove the pair or record it again")]
+    NotFinite {
+        /// The log.
+        file: String,
+        /// Pair, from 1.
+        row: usize,
+        /// Column that holds it.
+        column: &'static str,
+        /// The value.
+        value: f64,
+    },
+    /// No stretch of constant speed is long enough.
+    #[error("{file}: no stretch of constant speed is long enough for pairs ({reason}), hold each speed for {seconds} s or more")]
+    NoPairs {
+        /// The log.
+        file: String,
+        /// What was found instead.
+        reason: String,
+        /// The least time at one speed, s.
+        seconds: f64,
+    },
+    /// One speed tells nothing about a curve.
+    #[error("all {pairs} pairs of {file} are at one speed, {speed_rad_s:.3} rad/s: record at least {needed} speeds, or give the logs of the others too")]
+    OneSpeed {
+        /// The logs.
+        file: String,
+        /// How many pairs there are.
+        pairs: usize,
+        /// Their speed, rad/s.
+        speed_rad_s: f64,
+        /// Speeds that are needed.
+        needed: usize,
+    },
+    /// Six parameters need six speeds.
+    #[error("the pairs of {file} have {found} distinct speeds and six parameters need at least {needed}: record more speeds")]
+    TooFewSpeeds {
+        /// The logs.
+        file: String,
+        /// Distinct speeds.
+        found: usize,
+        /// Speeds that are needed.
+        needed: usize,
+    },
+    /// Torques without any difference.
+    #[error("the torques of {file} are all {value} N m: the torque column is not a measured or commanded torque, map the right one")]
+    ConstantTorque {
+        /// The logs.
+        file: String,
+        /// The one value, N m.
+        value: f64,
+    },
+    /// Logs that answer different questions.
+    #[error("{first} holds {first_kind} and {second} holds {second_kind}: fit them apart")]
+    MixedLogs {
+        /// A log.
+        first: String,
+        /// What it holds.
+        first_kind: &'static str,
+        /// Another log.
+        second: String,
+        /// What that one holds.
+        second_kind: &'static str,
+    },
+    /// A robot on its wheels does not show its motors' friction alone.
+    #[error("{file}: a robot log gives friction only with the wheels in the air at constant speeds, record such a sweep or use `refine`")]
+    RobotMotion {
+        /// The log.
+        file: String,
+    },
+    /// The watcher ended the fit.
+    #[error("the fit was cancelled after {iteration} of {iterations} iterations, start it again")]
+    Cancelled {
+        /// Iterations done.
+        iteration: usize,
+        /// Iterations asked for.
+        iterations: usize,
+    },
+}

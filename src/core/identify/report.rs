@@ -1,0 +1,67 @@
+//! What a fit found and how far it can be believed.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::FrictionPair;
+use super::parameters::KEYS;
+use crate::friction::StribeckParameters;
+use crate::record::HealthFinding;
+
+/// A parameter with its interval.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Estimate {
+    /// Unit in the parameter's key.
+    pub value: f64,
+    /// 95 % interval; none where the method gives none or the parameter was not fitted.
+    pub ci95: Option<[f64; 2]>,
+}
+
+/// Why a search ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum StopReason {
+    /// All iterations were done.
+    MaxIterations,
+    /// The error stayed below the threshold.
+    ErrorThreshold,
+    /// The optimum was reached.
+    Converged,
+}
+
+/// Result of [`super::fit`].
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FitReport {
+    /// Keys as in the model file.
+    pub parameters: BTreeMap<&'static str, Estimate>,
+    /// Root of the mean of squared errors (Eq. 32), unit in `rmse_unit`.
+    pub rmse: f64,
+    /// `N m` or `N`.
+    pub rmse_unit: &'static str,
+    /// ‖residual‖ / ‖torque or force‖, without unit.
+    pub relative_error: f64,
+    /// The pairs of section 3.1; empty for fits from motion.
+    pub pairs: Vec<FrictionPair>,
+    /// Iterations of the swarm, or of the fit from motion.
+    pub iterations: usize,
+    /// Best error after each iteration, unit as `rmse`.
+    pub history: Vec<f64>,
+    /// What is wrong with the logs.
+    pub data_health: Vec<HealthFinding>,
+    /// What to know before believing the parameters.
+    pub warnings: Vec<String>,
+    /// Why the search ended.
+    pub stop: StopReason,
+}
+
+impl FitReport {
+    /// The Stribeck curve, where all six parameters were fitted.
+    pub fn stribeck(&self) -> Option<StribeckParameters> {
+        let mut point = [0.0; 6];
+        for (value, key) in point.iter_mut().zip(KEYS) {
+            *value = self.parameters.get(key)?.value;
+        }
+        Some(super::parameters::named(&point))
+    }
+}

@@ -1,0 +1,252 @@
+//! Staircases of speeds from a simulated bench: one shaft with Stribeck friction under a speed controller, Runge–Kutta
+//! at a twentieth of a millisecond, recorded with quantised speed, noise and jitter.
+
+use std::ops::ControlFlow;
+
+use super::test_data::{Noise, RIGHT};
+use super::*;
+use crate::friction::Stribeck;
+use crate::record::Log;
+
+const INERTIA: f64 = 0.005;
+/// 1 deg/s.
+const SPEED_STEP: f64 = 0.017_453_292_519_943_295;
+
+/// How a bench records.
+#[derive(Clone, Copy)]
+struct Bench {
+    sample_s: f64,
+    /// Share of the sample time by which a stamp may be off.
+    jitter: f64,
+    ramp_rad_s2: f64,
+    with_speed: bool,
+    with_target: bool,
+    torque_noise_nm: f64,
+}
+
+const BENCH: Bench = Bench {
+    sample_s: 0.001,
+    jitter: 0.0,
+    ramp_rad_s2: 20.0,
+    with_speed: true,
+    with_target: false,
+    torque_noise_nm: 0.01,
+};
+
+/// The target speed: each level is reached by a ramp and held.
+fn target(levels: &[(f64, f64)], ramp: f64, time: f64) -> f64 {
+    let (mut start, mut from) = (0.0, 0.0);
+    for &(level, hold) in levels {
+        let climb = (level - from).abs() / ramp;
+        if time < start + climb {
+            return from + (level - from) * (time - start) / climb;
+        }
+        if time < start + climb + hold {
+            return level;
+        }
+        start += climb + hold;
+        from = level;
+    }
+    from
+}
+
+fn acceleration(curve: &Stribeck, torque: f64, speed: f64) -> f64 {
+    // Friction turns steeply but smoothly through zero, so that the integrator may pass it.
+    let direction = (speed / 1e-3).tanh();
+    let p = curve.parameters();
+    let friction = curve.level_nm(speed) * direction + p.viscous_nm_s_rad * speed + p.offset_nm;
+    (torque - friction) / INERTIA
+}
+
+/// Runs the bench through the levels (speed rad/s, seconds).
+fn record(levels: &[(f64, f64)], bench: Bench, seed: u64) -> Log {
+    const DT: f64 = 5e-5;
+    let curve = Stribeck::new(RIGHT).unwrap();
+    let mut noise = Noise::new(seed);
+    let mut from = 0.0;
+    let mut duration = 0.0;
+    for &(level, hold) in levels {
+        duration += f64::abs(level - from) / bench.ramp_rad_s2 + hold;
+        from = level;
+    }
+    let (mut angle, mut speed, mut integral) = (0.0f64, 0.0f64, 0.0f64);
+    let mut columns = vec![Vec::new(); 5];
+    let mut stamp = 0.0;
+    let steps = (duration / DT) as usize;
+    for n in 0..steps {
+        let time = n as f64 * DT;
+        let wanted = target(levels, bench.ramp_rad_s2, time);
+        let error = wanted - speed;
+        integral += 4.0 * error * DT;
+        let torque = 0.2 * error + integral;
+        if time >= stamp {
+            let measured = speed + 0.5 * SPEED_STEP * noise.normal();
+            columns[0].push(time);
+            columns[1].push(angle);
+            columns[2].push(torque + bench.torque_noise_nm * noise.normal());
+            columns[3].push((measured / SPEED_STEP).round() * SPEED_STEP);
+            columns[4].push(wanted);
+            stamp = time + bench.sample_s * (1.0 + bench.jitter * (2.0 * noise.uniform() - 1.0));
+        }
+        let slope = |speed: f64| acceleration(&curve, torque, speed);
+        let k1 = slope(speed);
+        let k2 = slope(speed + 0.5 * DT * k1);
+        let k3 = slope(speed + 0.5 * DT * k2);
+        let k4 = slope(speed + DT * k3);
+        angle += DT * speed + DT * DT / 6.0 * (k1 + k2 + k3);
+        speed += DT / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4);
+    }
+    let names = ["time_s", "motor_angle_rad", "torque_nm", "motor_speed_rad_s", "target_speed_rad_s"];
+    let kept = |name: &str| match name {
+        "motor_speed_rad_s" => bench.with_speed,
+        "target_speed_rad_s" => bench.with_target,
+        _ => true,
+    };
+    Log::from_columns("bench.csv", names.into_iter().zip(columns).filter(|(name, _)| kept(name)))
+}
+
+/// Every level held for `hold` s gives eight pairs at that speed and on the curve, and nothing else does.
+fn check(levels: &[(f64, f64)], bench: Bench, speed_tolerance: f64) -> PairSet {
+    let set = pairs_from_log(&record(levels, bench, 1), Motor::Left).unwrap();
+    let expected: Vec<f64> =
+        levels.iter().filter(|(level, hold)| *level != 0.0 && *hold >= 0.6).map(|(level, _)| *level).collect();
+    let found: Vec<f64> = set.dwells.iter().map(|dwell| dwell.speed_rad_s).collect();
+    assert_eq!(found.len(), expected.len(), "{found:.3?} for {expected:.3?}; {:?}", set.warnings);
+    let curve = Stribeck::new(RIGHT).unwrap();
+    for (k, pair) in set.pairs.iter().enumerate() {
+        let level = expected[k / 8];
+        assert!((pair.speed_rad_s - level).abs() < speed_tolerance, "{} for {level}", pair.speed_rad_s);
+        // Eight segments of 40 ms or more average the torque noise; six standard errors.
+        let samples = 0.08 * levels.iter().find(|(l, _)| *l == level).unwrap().1 / bench.sample_s;
+        let allowed = 6.0 * bench.torque_noise_nm / samples.sqrt() + 1e-3;
+        let torque = curve.torque_nm(pair.speed_rad_s);
+        assert!((pair.torque_nm - torque).abs() < allowed, "{pair:?} for {torque}");
+    }
+    assert!(set.is_constant_speed(), "{}", set.constant_share);
+    set
+}
+
+fn both_directions(speeds: &[f64], hold: f64) -> Vec<(f64, f64)> {
+    speeds.iter().chain([0.0].iter()).copied().chain(speeds.iter().map(|q| -q)).map(|q| (q, hold)).collect()
+}
+
+#[test]
+fn a_staircase_is_split_at_its_speeds_without_being_told_them() {
+    let levels = both_directions(&[0.1, 0.3, 1.0, 3.0, 8.0, 20.0, 45.0], 1.5);
+    let set = check(&levels, BENCH, 0.02);
+    assert_eq!(set.pairs.len(), 14 * 8);
+    assert_eq!(set.warnings, Vec::<String>::new());
+}
+
+#[test]
+fn target_speed_angle_only_jitter_and_slow_sampling_give_the_same_split() {
+    let levels = both_directions(&[0.3, 1.0, 3.0, 8.0, 20.0], 2.0);
+    check(&levels, Bench { with_target: true, ..BENCH }, 0.02);
+    check(&levels, Bench { with_speed: false, ..BENCH }, 0.02);
+    check(&levels, Bench { jitter: 0.4, ..BENCH }, 0.02);
+    check(&levels, Bench { sample_s: 0.01, jitter: 0.2, ..BENCH }, 0.02);
+    check(&levels, Bench { sample_s: 0.02, ramp_rad_s2: 8.0, torque_noise_nm: 0.002, ..BENCH }, 0.02);
+}
+
+#[test]
+fn uneven_dwells_and_a_speed_as_small_as_its_quantisation_are_found() {
+    let levels = [(0.02, 4.0), (0.06, 2.0), (-0.03, 3.0), (2.0, 0.8), (2.2, 5.0), (-6.0, 1.0), (-5.6, 1.2)];
+    check(&levels, BENCH, 0.01);
+}
+
+#[test]
+fn a_short_dwell_is_left_out_and_its_time_is_named() {
+    let levels = [(2.0, 2.0), (6.0, 0.35), (10.0, 2.0), (15.0, 2.0)];
+    for with_target in [false, true] {
+        let set = check(&levels, Bench { with_target, ..BENCH }, 0.02);
+        assert_eq!(set.warnings.len(), 1, "{:?}", set.warnings);
+        let text = &set.warnings[0];
+        assert!(text.contains("too short"), "{text}");
+        let start: f64 = text.split("from ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+        assert!((2.25..2.5).contains(&start), "{text}");
+    }
+}
+
+#[test]
+fn a_gap_ends_a_dwell_and_rows_without_speed_are_left_out() {
+    let log = record(&[(3.0, 4.0), (9.0, 2.0)], BENCH, 1);
+    let cut = |name: &str| -> Vec<f64> {
+        let values = log.column(name).unwrap();
+        values[..1500].iter().chain(&values[2200..]).copied().collect()
+    };
+    let names = ["time_s", "motor_angle_rad", "torque_nm", "motor_speed_rad_s"];
+    let mut columns: Vec<(&str, Vec<f64>)> = names.iter().map(|name| (*name, cut(name))).collect();
+    columns[3].1[100..110].fill(f64::NAN);
+    let set = pairs_from_log(&Log::from_columns("gap.csv", columns), Motor::Left).unwrap();
+    let speeds: Vec<i64> = set.dwells.iter().map(|dwell| dwell.speed_rad_s.round() as i64).collect();
+    assert_eq!(speeds, [3, 3, 9]);
+    assert!(set.dwells[0].end_s < 1.51 && set.dwells[1].start_s > 2.19);
+    assert!(set.pairs.iter().all(|pair| pair.speed_rad_s.is_finite() && pair.torque_nm.is_finite()));
+}
+
+/// A sine, a ramp and an unsteady walk are no constant speeds.
+#[test]
+fn other_motions_are_told_apart() {
+    let log = |angle: &dyn Fn(f64) -> f64| {
+        let time: Vec<f64> = (0..20_000).map(|i| f64::from(i) * 0.001).collect();
+        let angle: Vec<f64> = time.iter().map(|&t| angle(t)).collect();
+        let torque = vec![0.1; time.len()];
+        Log::from_columns("motion.csv", [("time_s", time), ("motor_angle_rad", angle), ("torque_nm", torque)])
+    };
+    let share = |log: Log| pairs_from_log(&log, Motor::Left).map_or(0.0, |set| set.constant_share);
+    for period in [0.5, 2.0, 8.0] {
+        let omega = std::f64::consts::TAU / period;
+        let found = share(log(&|t| 5.0 * (omega * t).sin()));
+        assert!(found < 0.4, "sine of {period} s: {found}");
+    }
+    assert!(share(log(&|t| 0.5 * t * t)) < 0.4);
+    let multisine = |t: f64| (1..6).map(|k| (1.3 * f64::from(k * k) * t).sin() / f64::from(k)).sum::<f64>();
+    assert!(share(log(&multisine)) < 0.4);
+}
+
+/// From the bench log to the parameters: the whole way of section 3.
+#[test]
+fn a_sweep_gives_back_the_curve() {
+    let levels = both_directions(&[0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 40.0], 1.0);
+    let log = record(&levels, BENCH, 2);
+    let report = fit(&[log], None, Motor::Left, &FitOptions::default(), &mut |_| ControlFlow::Continue(())).unwrap();
+    assert_eq!(report.pairs.len(), 160);
+    let [found, truth] = [report.stribeck().unwrap(), RIGHT].map(|p| Stribeck::new(p).unwrap());
+    for speed in [-40.0, -3.0, -0.3, -0.05, 0.05, 0.1, 1.0, 15.0, 40.0] {
+        let (found, truth) = (found.torque_nm(speed), truth.torque_nm(speed));
+        assert!((found - truth).abs() < 0.0015, "at {speed} rad/s: {found} for {truth}");
+    }
+}
+
+#[test]
+fn logs_of_one_speed_each_are_merged_and_other_mixtures_are_refused() {
+    let run = |logs: &[Log]| fit(logs, None, Motor::Left, &FitOptions::default(), &mut |_| ControlFlow::Continue(()));
+    let one = |speed: f64| record(&[(speed, 2.0)], BENCH, 1);
+    let error = run(&[one(5.0)]).unwrap_err().to_string();
+    assert!(error.contains("are at one speed, 5.0") && error.contains("bench.csv"), "{error}");
+    let logs: Vec<Log> = [-20.0, -5.0, -1.0, -0.2, 0.2, 1.0, 5.0, 20.0].map(one).into();
+    assert_eq!(run(&logs).unwrap().pairs.len(), 64);
+    assert_eq!(run(&[]).unwrap_err(), FitError::NoLogs);
+}
+
+/// Measured data: a real motor under a speed controller whose speed wanders by a tenth.
+#[test]
+fn a_measured_constant_speed_is_recognised() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/laas_bldc/speed_test1.csv");
+    let Ok(text) = std::fs::read_to_string(path) else {
+        assert!(std::env::var_os("FLQR_REQUIRE_SHARED").is_none(), "{path} is missing");
+        return;
+    };
+    let column = |k: usize| -> Vec<f64> {
+        text.lines().skip(1).map(|line| line.split(',').nth(k).unwrap().parse().unwrap()).collect()
+    };
+    let log = Log::from_columns(
+        "speed_test1.csv",
+        [("time_s", 0), ("motor_angle_rad", 1), ("motor_speed_rad_s", 2), ("torque_nm", 4)]
+            .map(|(name, k)| (name, column(k))),
+    );
+    let set = pairs_from_log(&log, Motor::Left).unwrap();
+    let speeds: Vec<f64> = set.dwells.iter().map(|dwell| dwell.speed_rad_s).collect();
+    assert!(set.is_constant_speed(), "{} {speeds:?} {:?}", set.constant_share, set.warnings);
+    assert!(speeds.iter().all(|speed| (3.8..5.8).contains(speed)), "{speeds:?}");
+}
