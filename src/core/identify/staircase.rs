@@ -279,7 +279,7 @@ fn keep(recording: &Recording, blocks: &Blocks, rows: &Range<usize>, warnings: &
     let spread = 3.5 * swing / (values.len().max(1) as f64).sqrt();
     let allowed = (0.1 * speed.abs()).max(2.0 * LEVEL_RAD_S).max(spread.min(0.3 * speed.abs()));
     let moved = drift(values).abs();
-    let steady = moved <= allowed && swing <= (0.5 * speed.abs()).max(2.0 * LEVEL_RAD_S);
+    let steady = moved <= allowed && swing <= (0.15 * speed.abs()).max(5.0 * LEVEL_RAD_S);
     if !steady {
         warnings.push(format!(
             "the speed is not constant from {:.2} s to {:.2} s (mean {speed:.3}, drift {moved:.3}, standard deviation \
