@@ -1,6 +1,7 @@
 //! Why a fit is refused.
 
-use crate::record::LogError;
+use super::motion::MotionError;
+use crate::record::{LogError, LogKind};
 
 /// Why no fit could be made; each says what, where and the mend.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -11,6 +12,21 @@ pub enum FitError {
     /// A log lacks columns.
     #[error(transparent)]
     Log(#[from] LogError),
+    /// A motion could not be fitted.
+    #[error(transparent)]
+    Motion(#[from] MotionError),
+    /// A model of another axis.
+    #[error(
+        "{file} is a {kind} and the model describes the axis of a {wanted}, give a model of the same axis or none"
+    )]
+    WrongModel {
+        /// The log.
+        file: String,
+        /// What it holds.
+        kind: LogKind,
+        /// What the model is for.
+        wanted: LogKind,
+    },
     /// A number that is none.
     #[error("{file}: pair {row} has the value {value} in `{column}`, remove the pair or record it again")]
     NotFinite {
@@ -24,7 +40,9 @@ pub enum FitError {
         value: f64,
     },
     /// No stretch of constant speed is long enough.
-    #[error("{file}: no stretch of constant speed is long enough for pairs ({reason}), hold each speed for {seconds} s or more")]
+    #[error(
+        "{file}: no stretch of constant speed is long enough for pairs ({reason}), hold each speed for {seconds} s or more"
+    )]
     NoPairs {
         /// The log.
         file: String,
@@ -34,7 +52,9 @@ pub enum FitError {
         seconds: f64,
     },
     /// One speed tells nothing about a curve.
-    #[error("all {pairs} pairs of {file} are at one speed, {speed_rad_s:.3} rad/s: record at least {needed} speeds, or give the logs of the others too")]
+    #[error(
+        "all {pairs} pairs of {file} are at one speed, {speed_rad_s:.3} rad/s: record at least {needed} speeds, or give the logs of the others too"
+    )]
     OneSpeed {
         /// The logs.
         file: String,
@@ -46,7 +66,9 @@ pub enum FitError {
         needed: usize,
     },
     /// Six parameters need six speeds.
-    #[error("the pairs of {file} have {found} distinct speeds and six parameters need at least {needed}: record more speeds")]
+    #[error(
+        "the pairs of {file} have {found} distinct speeds and six parameters need at least {needed}: record more speeds"
+    )]
     TooFewSpeeds {
         /// The logs.
         file: String,
@@ -56,7 +78,9 @@ pub enum FitError {
         needed: usize,
     },
     /// Torques without any difference.
-    #[error("the torques of {file} are all {value} N m: the torque column is not a measured or commanded torque, map the right one")]
+    #[error(
+        "the torques of {file} are all {value} N m: the torque column is not a measured or commanded torque, map the right one"
+    )]
     ConstantTorque {
         /// The logs.
         file: String,
@@ -76,7 +100,9 @@ pub enum FitError {
         second_kind: &'static str,
     },
     /// A robot on its wheels does not show its motors' friction alone.
-    #[error("{file}: a robot log gives friction only with the wheels in the air at constant speeds, record such a sweep or use `refine`")]
+    #[error(
+        "{file}: a robot log gives friction only with the wheels in the air at constant speeds, record such a sweep or use `refine`"
+    )]
     RobotMotion {
         /// The log.
         file: String,

@@ -39,7 +39,12 @@ pub(super) fn pair_warnings(pairs: &[FrictionPair]) -> Vec<String> {
 }
 
 /// What the fit leaves open.
-pub(super) fn fit_warnings(point: &Point, range: &SearchBox, bounds: Bounds, confidence: Option<&Confidence>) -> Vec<String> {
+pub(super) fn fit_warnings(
+    point: &Point,
+    range: &SearchBox,
+    bounds: Bounds,
+    confidence: Option<&Confidence>,
+) -> Vec<String> {
     let mut warnings: Vec<String> = bound_warnings(point, range, bounds).collect();
     let Some(confidence) = confidence else { return warnings };
     let loose: Vec<&str> = (0..6).filter(|&d| is_loose(point, confidence, d)).map(|d| KEYS[d]).collect();
@@ -73,7 +78,10 @@ fn bound_warnings(point: &Point, range: &SearchBox, bounds: Bounds) -> impl Iter
             Bounds::Paper => "the paper's bound excludes the optimum, fit with bounds from the data",
             Bounds::Data => "the data do not determine it, or the model lacks an effect",
         };
-        Some(format!("`{}` = {:.3e} sits on the {side} end of its searched range: {cause}", KEYS[d], point[d]))
+        Some(format!(
+            "`{}` = {:.3e} sits on the {side} end of its searched range: {cause}",
+            KEYS[d], point[d]
+        ))
     })
 }
 

@@ -72,7 +72,8 @@ fn linearised(samples: &Samples, range: &SearchBox, fit: &Fit) -> ([f64; 6], f64
     let eigen = scaled.symmetric_eigen();
     let smallest = eigen.eigenvalues.min();
     let silent = fitted.iter().any(|&d| scale[d] == 0.0);
-    let condition = if silent || smallest <= 0.0 { f64::INFINITY } else { eigen.eigenvalues.max() / smallest };
+    let condition =
+        if silent || smallest <= 0.0 { f64::INFINITY } else { eigen.eigenvalues.max() / smallest };
     let variance = fit.sum / samples.len().saturating_sub(fitted.len()).max(1) as f64;
     let spread = |d: usize| {
         (0..6).map(|k| eigen.eigenvectors[(d, k)].powi(2) / eigen.eigenvalues[k].max(1e-14)).sum::<f64>()
@@ -109,7 +110,8 @@ impl Profile<'_> {
         let limit = coordinate(d, if side < 0.0 { self.range.lower[d] } else { self.range.upper[d] });
         let start = coordinate(d, self.fit.point[d]);
         let span = (limit - start).abs();
-        let mut inner = Place { at: start, beyond: -(self.target - self.fit.sum).sqrt(), point: self.fit.point };
+        let mut inner =
+            Place { at: start, beyond: -(self.target - self.fit.sum).sqrt(), point: self.fit.point };
         let mut step = if first_step.is_finite() && first_step > 0.0 { first_step } else { 0.1 * span };
         loop {
             let reached = (inner.at - limit) * side >= 0.0;

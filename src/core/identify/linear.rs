@@ -71,12 +71,19 @@ impl NormalEquations {
 
     fn restricted(&self, holds: &[Hold; 4]) -> Matrix4<f64> {
         let free = |i: usize| holds[i] == Hold::Free;
-        Matrix4::from_fn(|i, j| {
-            if free(i) && free(j) { self.gram[(i, j)] } else { f64::from(u8::from(i == j)) }
-        })
+        Matrix4::from_fn(
+            |i, j| {
+                if free(i) && free(j) { self.gram[(i, j)] } else { f64::from(u8::from(i == j)) }
+            },
+        )
     }
 
-    fn held_solution(&self, holds: &[Hold; 4], low: &Vector4<f64>, high: &Vector4<f64>) -> Option<Vector4<f64>> {
+    fn held_solution(
+        &self,
+        holds: &[Hold; 4],
+        low: &Vector4<f64>,
+        high: &Vector4<f64>,
+    ) -> Option<Vector4<f64>> {
         let fixed = Vector4::from_fn(|i, _| match holds[i] {
             Hold::Free => 0.0,
             Hold::Lower => low[i],
@@ -87,7 +94,13 @@ impl NormalEquations {
         Some(self.restricted(holds).cholesky()?.solve(&right))
     }
 
-    fn is_optimal(&self, holds: &[Hold; 4], value: &Vector4<f64>, low: &Vector4<f64>, high: &Vector4<f64>) -> bool {
+    fn is_optimal(
+        &self,
+        holds: &[Hold; 4],
+        value: &Vector4<f64>,
+        low: &Vector4<f64>,
+        high: &Vector4<f64>,
+    ) -> bool {
         let tolerance = 1e-12 * self.right.amax();
         let force = self.right - self.gram * value;
         (0..4).all(|i| match holds[i] {
@@ -102,7 +115,13 @@ impl NormalEquations {
         value.dot(&(self.gram * value)) - 2.0 * value.dot(&self.right)
     }
 
-    fn unscaled(&self, value: &Vector4<f64>, holds: &[Hold; 4], low: &Vector4<f64>, high: &Vector4<f64>) -> LinearFit {
+    fn unscaled(
+        &self,
+        value: &Vector4<f64>,
+        holds: &[Hold; 4],
+        low: &Vector4<f64>,
+        high: &Vector4<f64>,
+    ) -> LinearFit {
         let inside = Vector4::from_fn(|i, _| value[i].clamp(low[i], high[i]) / self.scale[i]);
         LinearFit { value: inside, free: holds.map(|hold| hold == Hold::Free) }
     }

@@ -66,7 +66,9 @@ pub fn pairs_from_log(log: &Log, motor: Motor) -> Result<PairSet, FitError> {
     };
     let names = match (kind, motor) {
         (LogKind::Robot, Motor::Left) => ["motor_angle_left_rad", "torque_left_nm", "motor_speed_left_rad_s"],
-        (LogKind::Robot, Motor::Right) => ["motor_angle_right_rad", "torque_right_nm", "motor_speed_right_rad_s"],
+        (LogKind::Robot, Motor::Right) => {
+            ["motor_angle_right_rad", "torque_right_nm", "motor_speed_right_rad_s"]
+        }
         _ => ["motor_angle_rad", "torque_nm", "motor_speed_rad_s"],
     };
     let columns = [log.required(LogKind::Bench, names[0])?, log.required(LogKind::Bench, names[1])?];
@@ -95,8 +97,12 @@ fn pairs_file(speed: &[f64], torque: &[f64]) -> PairSet {
 
 fn pairs_of(recording: &Recording) -> PairSet {
     let found = split(recording);
-    let mut set =
-        PairSet { pairs: Vec::new(), dwells: Vec::new(), constant_share: found.constant_share, warnings: found.warnings };
+    let mut set = PairSet {
+        pairs: Vec::new(),
+        dwells: Vec::new(),
+        constant_share: found.constant_share,
+        warnings: found.warnings,
+    };
     for rows in found.dwells {
         let edge = rows.len() / 10;
         let (start, end) = (rows.start + edge, rows.end - edge);

@@ -164,13 +164,19 @@ impl<'a> Projection<'a> {
     }
 
     /// The damped step; a coordinate at an end of its range that would leave it stays.
-    fn step(&self, at: &Vector2<f64>, (gradient, square): &(Vector2<f64>, Matrix2<f64>), damping: f64) -> Vector2<f64> {
+    fn step(
+        &self,
+        at: &Vector2<f64>,
+        (gradient, square): &(Vector2<f64>, Matrix2<f64>),
+        damping: f64,
+    ) -> Vector2<f64> {
         let mut matrix = *square;
         let mut right = -gradient;
         let diagonal = square.diagonal();
         for i in 0..2 {
             matrix[(i, i)] += damping * diagonal[i] + f64::MIN_POSITIVE;
-            let outwards = (at[i] <= self.low[i] && right[i] < 0.0) || (at[i] >= self.high[i] && right[i] > 0.0);
+            let outwards =
+                (at[i] <= self.low[i] && right[i] < 0.0) || (at[i] >= self.high[i] && right[i] > 0.0);
             if outwards || self.low[i] == self.high[i] || diagonal[i] <= 0.0 {
                 right[i] = 0.0;
                 matrix[(i, 1 - i)] = 0.0;

@@ -66,7 +66,13 @@ impl Samples {
     }
 
     /// For every pair u = (|q̇|/v_s)^ξ, at most about 708, and exp(−u), both without unit.
-    pub(super) fn fade(&self, log2_stribeck_speed: f64, exponent: f64, power: &mut [f64], fading: &mut [f64]) {
+    pub(super) fn fade(
+        &self,
+        log2_stribeck_speed: f64,
+        exponent: f64,
+        power: &mut [f64],
+        fading: &mut [f64],
+    ) {
         pulp::Arch::new().dispatch(
             #[inline(always)]
             || {
@@ -125,13 +131,14 @@ fn sum_below(samples: &Samples, point: &Point, limit: f64) -> f64 {
             }
         }
         start = end;
-        let sum = ((lanes[0] + lanes[4]) + (lanes[1] + lanes[5])) + ((lanes[2] + lanes[6]) + (lanes[3] + lanes[7]));
-        // Written so that NaN, too, is no improvement.
-        if !(sum < limit) {
-            return limit;
-        }
+        let sum =
+            ((lanes[0] + lanes[4]) + (lanes[1] + lanes[5])) + ((lanes[2] + lanes[6]) + (lanes[3] + lanes[7]));
         if end == samples.len() {
-            return sum;
+            // NaN is no improvement.
+            return if sum < limit { sum } else { limit };
+        }
+        if sum >= limit {
+            return limit;
         }
     }
     limit

@@ -49,7 +49,8 @@ impl<'a> Recording<'a> {
     ) -> Self {
         let useful = |column: Option<&'a [f64]>| column.filter(|values| values.iter().any(|v| v.is_finite()));
         let (speed, target) = (useful(speed), useful(target));
-        let columns: Vec<&[f64]> = [Some(time), Some(angle), Some(torque), speed, target].into_iter().flatten().collect();
+        let columns: Vec<&[f64]> =
+            [Some(time), Some(angle), Some(torque), speed, target].into_iter().flatten().collect();
         let kept: Vec<usize> =
             (0..time.len()).filter(|&i| columns.iter().all(|column| column[i].is_finite())).collect();
         let pick = |column: &'a [f64]| {
@@ -59,7 +60,13 @@ impl<'a> Recording<'a> {
                 Cow::Owned(kept.iter().map(|&i| column[i]).collect())
             }
         };
-        Self { time: pick(time), angle: pick(angle), torque: pick(torque), speed: speed.map(pick), target: target.map(pick) }
+        Self {
+            time: pick(time),
+            angle: pick(angle),
+            torque: pick(torque),
+            speed: speed.map(pick),
+            target: target.map(pick),
+        }
     }
 
     /// Mean speed of some rows, rad/s: the slope of the angle, or the mean of the speed column where they disagree.
@@ -184,11 +191,17 @@ impl Blocks {
 fn candidates(recording: &Recording, blocks: &Blocks, warnings: &mut Vec<String>) -> Vec<Range<usize>> {
     if let Some(target) = &recording.target {
         let runs = constant_runs(target, blocks.rows.clone());
-        let steady: f64 = runs.iter().filter(|rows| long_enough(recording, rows)).map(|rows| recording.duration(rows)).sum();
+        let steady: f64 = runs
+            .iter()
+            .filter(|rows| long_enough(recording, rows))
+            .map(|rows| recording.duration(rows))
+            .sum();
         if steady >= 0.5 * recording.duration(&blocks.rows) {
-            let (long, short): (Vec<_>, Vec<_>) = runs.into_iter().partition(|rows| long_enough(recording, rows));
+            let (long, short): (Vec<_>, Vec<_>) =
+                runs.into_iter().partition(|rows| long_enough(recording, rows));
             // Shorter than a block is a step of a ramp.
-            let dwells = short.iter().filter(|rows| rows.len() > 2 * blocks.size && target[rows.start] != 0.0);
+            let dwells =
+                short.iter().filter(|rows| rows.len() > 2 * blocks.size && target[rows.start] != 0.0);
             warnings.extend(dwells.map(|rows| too_short(recording, rows)));
             return long;
         }
@@ -235,7 +248,9 @@ fn constant_runs(values: &[f64], rows: Range<usize>) -> Vec<Range<usize>> {
 
 /// Whether a short piece is a dwell rather than a part of a ramp: its drift is small beside the steps around it.
 fn is_flat(blocks: &Blocks, levels: &[Level], i: usize) -> bool {
-    let Some(neighbours) = i.checked_sub(1).and_then(|before| Some((levels.get(before)?, levels.get(i + 1)?))) else {
+    let Some(neighbours) =
+        i.checked_sub(1).and_then(|before| Some((levels.get(before)?, levels.get(i + 1)?)))
+    else {
         return false;
     };
     let level = &levels[i];
@@ -279,7 +294,8 @@ fn keep(recording: &Recording, blocks: &Blocks, rows: &Range<usize>, warnings: &
     let spread = 3.5 * swing / (values.len().max(1) as f64).sqrt();
     let allowed = (0.1 * speed.abs()).max(2.0 * LEVEL_RAD_S).max(spread.min(0.3 * speed.abs()));
     let moved = drift(values).abs();
-    let steady = moved <= allowed && swing <= (0.15 * speed.abs()).max(5.0 * LEVEL_RAD_S);
+    let bends = bend(values).abs() > (0.06 * speed.abs()).max(2.0 * LEVEL_RAD_S);
+    let steady = !bends && moved <= allowed && swing <= (0.15 * speed.abs()).max(5.0 * LEVEL_RAD_S);
     if !steady {
         warnings.push(format!(
             "the speed is not constant from {:.2} s to {:.2} s (mean {speed:.3}, drift {moved:.3}, standard deviation \
@@ -377,4 +393,14 @@ fn drift(values: &[f64]) -> f64 {
     }
     let x: Vec<f64> = (0..values.len()).map(|i| i as f64).collect();
     slope(&x, values) * (values.len() - 1) as f64
+}
+
+/// Mean of the middle third less that of the outer thirds: the top of a swing is no constant speed, however flat.
+fn bend(values: &[f64]) -> f64 {
+    let third = values.len() / 3;
+    if third == 0 {
+        return 0.0;
+    }
+    let (start, end) = (&values[..third], &values[values.len() - third..]);
+    mean(&values[third..values.len() - third]) - 0.5 * (mean(start) + mean(end))
 }

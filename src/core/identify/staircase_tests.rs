@@ -3,7 +3,7 @@
 
 use std::ops::ControlFlow;
 
-use super::test_data::{Noise, RIGHT};
+use super::test_data::{Noise, RIGHT, measured};
 use super::*;
 use crate::friction::Stribeck;
 use crate::record::Log;
@@ -108,8 +108,11 @@ fn record(levels: &[(f64, f64)], bench: Bench, seed: u64) -> Log {
 /// Every level held for `hold` s gives eight pairs at that speed and on the curve, and nothing else does.
 fn check(levels: &[(f64, f64)], bench: Bench, speed_tolerance: f64) -> PairSet {
     let set = pairs_from_log(&record(levels, bench, 1), Motor::Left).unwrap();
-    let expected: Vec<f64> =
-        levels.iter().filter(|(level, hold)| *level != 0.0 && *hold >= 0.6).map(|(level, _)| *level).collect();
+    let expected: Vec<f64> = levels
+        .iter()
+        .filter(|(level, hold)| *level != 0.0 && *hold >= 0.6)
+        .map(|(level, _)| *level)
+        .collect();
     let found: Vec<f64> = set.dwells.iter().map(|dwell| dwell.speed_rad_s).collect();
     assert_eq!(found.len(), expected.len(), "{found:.3?} for {expected:.3?}; {:?}", set.warnings);
     let curve = Stribeck::new(RIGHT).unwrap();
@@ -209,7 +212,8 @@ fn other_motions_are_told_apart() {
 fn a_sweep_gives_back_the_curve() {
     let levels = both_directions(&[0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 40.0], 1.0);
     let log = record(&levels, BENCH, 2);
-    let report = fit(&[log], None, Motor::Left, &FitOptions::default(), &mut |_| ControlFlow::Continue(())).unwrap();
+    let report =
+        fit(&[log], None, Motor::Left, &FitOptions::default(), &mut |_| ControlFlow::Continue(())).unwrap();
     assert_eq!(report.pairs.len(), 160);
     let [found, truth] = [report.stribeck().unwrap(), RIGHT].map(|p| Stribeck::new(p).unwrap());
     for speed in [-40.0, -3.0, -0.3, -0.05, 0.05, 0.1, 1.0, 15.0, 40.0] {
@@ -220,7 +224,9 @@ fn a_sweep_gives_back_the_curve() {
 
 #[test]
 fn logs_of_one_speed_each_are_merged_and_other_mixtures_are_refused() {
-    let run = |logs: &[Log]| fit(logs, None, Motor::Left, &FitOptions::default(), &mut |_| ControlFlow::Continue(()));
+    let run = |logs: &[Log]| {
+        fit(logs, None, Motor::Left, &FitOptions::default(), &mut |_| ControlFlow::Continue(()))
+    };
     let one = |speed: f64| record(&[(speed, 2.0)], BENCH, 1);
     let error = run(&[one(5.0)]).unwrap_err().to_string();
     assert!(error.contains("are at one speed, 5.0") && error.contains("bench.csv"), "{error}");
@@ -232,21 +238,52 @@ fn logs_of_one_speed_each_are_merged_and_other_mixtures_are_refused() {
 /// Measured data: a real motor under a speed controller whose speed wanders by a tenth.
 #[test]
 fn a_measured_constant_speed_is_recognised() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/laas_bldc/speed_test1.csv");
-    let Ok(text) = std::fs::read_to_string(path) else {
-        assert!(std::env::var_os("FLQR_REQUIRE_SHARED").is_none(), "{path} is missing");
-        return;
-    };
-    let column = |k: usize| -> Vec<f64> {
-        text.lines().skip(1).map(|line| line.split(',').nth(k).unwrap().parse().unwrap()).collect()
-    };
-    let log = Log::from_columns(
-        "speed_test1.csv",
-        [("time_s", 0), ("motor_angle_rad", 1), ("motor_speed_rad_s", 2), ("torque_nm", 4)]
-            .map(|(name, k)| (name, column(k))),
-    );
+    let map = ["torque_nm=current_a", "motor_angle_rad=angle_rad", "motor_speed_rad_s=speed_rad_s"];
+    let Some(log) = measured("laas_bldc/speed_test1.csv", &map) else { return };
     let set = pairs_from_log(&log, Motor::Left).unwrap();
     let speeds: Vec<f64> = set.dwells.iter().map(|dwell| dwell.speed_rad_s).collect();
     assert!(set.is_constant_speed(), "{} {speeds:?} {:?}", set.constant_share, set.warnings);
     assert!(speeds.iter().all(|speed| (3.8..5.8).contains(speed)), "{speeds:?}");
+}
+
+/// Measured motions that are not constant speeds: a current sine, a positioning axis, a swinging pendulum.
+#[test]
+fn measured_motions_are_fitted_as_motions() {
+    let bldc = ["torque_nm=current_a", "motor_angle_rad=angle_rad", "motor_speed_rad_s=speed_rad_s"];
+    for (name, map, key) in [
+        ("laas_bldc/acc_current.csv", &bldc[..], "inertia_kg_m2"),
+        ("undeclared/example-bench/log.csv", &[], "inertia_kg_m2"),
+        ("emps/emps_standard.csv", &[], "mass_kg"),
+    ] {
+        let Some(log) = measured(name, map) else { return };
+        let report =
+            fit(&[log], None, Motor::Left, &FitOptions::default(), &mut |_| ControlFlow::Continue(()));
+        let report = report.unwrap();
+        assert!(
+            report.parameters.contains_key(key) && report.pairs.is_empty(),
+            "{name}: {:?}",
+            report.parameters
+        );
+        assert!(report.stribeck().is_none());
+    }
+}
+
+#[test]
+fn naming_the_inertia_asks_for_a_fit_from_motion() {
+    let options = FitOptions { estimate: vec!["inertia_kg_m2".to_owned()], ..FitOptions::default() };
+    let log = record(&both_directions(&[1.0, 4.0, 9.0, 16.0], 0.6), BENCH, 1);
+    let report = fit(&[log], None, Motor::Left, &options, &mut |_| ControlFlow::Continue(())).unwrap();
+    let inertia = report.parameters["inertia_kg_m2"].value;
+    assert!((inertia / INERTIA - 1.0).abs() < 0.05, "{inertia}");
+}
+
+#[test]
+fn a_model_of_another_axis_is_refused() {
+    let text = "name = \"slide\"\n[axis]\nkind = \"linear\"\nmass_kg = 3.0\n";
+    let model = crate::model_file::Model::from_toml(text, "slide.toml").unwrap();
+    let log = record(&[(3.0, 1.0)], BENCH, 1);
+    let result =
+        fit(&[log], Some(&model), Motor::Left, &FitOptions::default(), &mut |_| ControlFlow::Continue(()));
+    let error = result.unwrap_err().to_string();
+    assert!(error.contains("bench.csv is a bench log") && error.contains("linear axis log"), "{error}");
 }

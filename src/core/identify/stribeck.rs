@@ -44,7 +44,10 @@ pub fn fit_pairs(
     let mut warnings = pair_warnings(pairs);
     let (fit, intervals) = match options.method {
         Method::Pso => {
-            warnings.push("the swarm alone gives no intervals, its result is not an optimum; use the method `best`".to_owned());
+            warnings.push(
+                "the swarm alone gives no intervals, its result is not an optimum; use the method `best`"
+                    .to_owned(),
+            );
             warnings.extend(fit_warnings(&swarm_fit.point, &range, options.bounds, None));
             (swarm_fit, [None; 6])
         }
@@ -81,7 +84,10 @@ pub fn polish_pairs(pairs: &[FrictionPair], range: &SearchBox) -> Option<(Stribe
     })
 }
 
-fn run(swarm: &mut Pso, watch: &mut dyn FnMut(&FitProgress) -> ControlFlow<()>) -> Result<Vec<f64>, FitError> {
+fn run(
+    swarm: &mut Pso,
+    watch: &mut dyn FnMut(&FitProgress) -> ControlFlow<()>,
+) -> Result<Vec<f64>, FitError> {
     let iterations = PsoSettings::default().iterations;
     let mut history = Vec::with_capacity(iterations);
     for step in swarm {

@@ -226,7 +226,10 @@ mod tests {
             let mut last = swarm.progress().best_error_nm;
             let range = swarm.range;
             for iteration in 1.. {
-                assert!(swarm.positions.iter().all(|x| range.contains(x)), "seed {seed}, iteration {iteration}");
+                assert!(
+                    swarm.positions.iter().all(|x| range.contains(x)),
+                    "seed {seed}, iteration {iteration}"
+                );
                 let Some(step) = swarm.next() else { break };
                 assert_eq!(step.iteration, iteration);
                 assert!(step.best_error_nm <= last);
@@ -260,8 +263,7 @@ mod tests {
         let pairs = even_pairs(&LEFT, 60, 0.002, 1);
         let best = swarm(3).last().unwrap();
         let curve = crate::friction::Stribeck::new(best.best).unwrap();
-        let squares: f64 =
-            pairs.iter().map(|p| (curve.torque_nm(p.speed_rad_s) - p.torque_nm).powi(2)).sum();
+        let squares: f64 = pairs.iter().map(|p| (curve.torque_nm(p.speed_rad_s) - p.torque_nm).powi(2)).sum();
         let expected = (squares / pairs.len() as f64).sqrt();
         assert!((best.best_error_nm / expected - 1.0).abs() < 1e-12);
     }

@@ -1,24 +1,5 @@
-use std::fs::File;
-use std::io::BufReader;
-
 use super::*;
-use crate::record::{ColumnMap, ReadOptions, read_log};
-
-const SHARED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/");
-
-/// A measured log, or nothing where the data are absent and not required.
-#[expect(clippy::disallowed_methods, reason = "measured data are read where they are at hand")]
-fn measured(name: &str, map: &[&str]) -> Option<Log> {
-    let path = format!("{SHARED}{name}");
-    let Ok(file) = File::open(&path) else {
-        assert!(std::env::var_os("FLQR_REQUIRE_SHARED").is_none(), "{path} is absent");
-        println!("skipped: {path} is absent");
-        return None;
-    };
-    let map = ColumnMap::new(map.iter().map(|entry| entry.parse().unwrap()).collect()).unwrap();
-    let mut quiet = |_| ControlFlow::Continue(());
-    Some(read_log(BufReader::new(file), name, &ReadOptions::new(&map), &mut quiet).unwrap())
-}
+use crate::identify::test_data::measured;
 
 fn fit(logs: &[Log], axis: Axis, known: Option<&KnownAxis>, estimate: &[&str]) -> MotionFit {
     let names: Vec<String> = estimate.iter().map(|name| (*name).to_owned()).collect();
