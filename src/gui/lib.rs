@@ -1,1 +1,30 @@
-//! x
+//! The window of flqr: tune the balance controller of a simulated robot, fit friction from a measured log.
+//!
+//! # Architecture
+//! - One owner: [`App`] holds the session document, the design, the histories and the jobs.
+//! - Views get a read context for the frame and send `Command`s; `App::logic` applies them at one place. A
+//!   pass that sent commands is discarded and drawn again, so what the user sees never lags its input.
+//! - Anything that can wait (files, dialogs, fits, the running robot) is on a named thread behind a
+//!   bounded channel. Workers wake the window; an idle window draws nothing.
+//! - The window holds no number that the core could not recompute.
+
+mod app;
+mod command;
+mod context;
+mod design;
+mod dialog;
+mod friction;
+mod history;
+mod job;
+mod live;
+pub mod plot;
+mod recent;
+mod session;
+mod state_out;
+mod theme;
+mod tune;
+mod widgets;
+mod window;
+
+pub use app::{App, Tab};
+pub use window::{WindowError, WindowOptions, run};

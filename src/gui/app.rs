@@ -1,0 +1,327 @@
+//! The owner of everything: session, design, running robot, jobs. Views read it and send commands.
+
+mod apply;
+mod shell;
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Duration;
+
+use egui::{Context, Ui};
+use flqr_core::control::ControllerKind;
+use flqr_core::model_file::Model;
+
+use crate::command::{Command, Commands, Source};
+use crate::context::ViewContext;
+use crate::design::Designer;
+use crate::dialog::{Answer, Dialog};
+use crate::friction::FrictionTab;
+use crate::history::History;
+use crate::job::{Job, Outcome, Waker};
+use crate::live::{Live, LiveCommand};
+use crate::recent::{self, Recent};
+use crate::session::Session;
+use crate::state_out::StateOut;
+use crate::tune::TuneTab;
+use crate::window::WindowOptions;
+
+/// The pages of the window.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Tab {
+    /// Weights, gains and the live robot.
+    #[default]
+    Tune,
+    /// Friction from a measured log.
+    Friction,
+}
+
+/// The last message, for the status line.
+#[derive(Default)]
+struct Status {
+    text: String,
+    is_error: bool,
+}
+
+/// A model file job: what it is for, and its result.
+enum ModelJob {
+    Load(PathBuf, Job<(), Result<Model, String>>),
+    Save(PathBuf, Session, Job<(), Result<(), String>>),
+}
+
+/// The window's content.
+pub struct App {
+    session: Session,
+    /// The session as loaded or saved last, for the mark of unsaved changes and for Reset.
+    saved: Session,
+    model_path: Option<PathBuf>,
+    tab: Tab,
+    source: Source,
+    designer: Designer,
+    live: Live,
+    history: History,
+    tune: TuneTab,
+    friction: FrictionTab,
+    commands: Commands,
+    status: Status,
+    recent: Recent,
+    recent_job: Option<Job<(), Recent>>,
+    dialog: Option<Dialog>,
+    model_job: Option<ModelJob>,
+    state_out: Option<StateOut>,
+    waker: Waker,
+    frame_interval: Duration,
+    frame_cpu_s: Option<f32>,
+}
+
+impl App {
+    /// Starts the window's threads.
+    ///
+    /// # Errors
+    /// The system gives no thread.
+    pub fn new(options: WindowOptions, ctx: &Context) -> std::io::Result<Self> {
+        crate::theme::apply(ctx);
+        let waker: Waker = {
+            let ctx = ctx.clone();
+            Arc::new(move || ctx.request_repaint())
+        };
+        let session = Session::new(options.model, ControllerKind::Flqr);
+        let state_out = options.state_out.map(StateOut::start).transpose()?;
+        let mut app = Self {
+            saved: session.clone(),
+            tune: TuneTab::new(&session, options.model_path.as_deref()),
+            session,
+            model_path: options.model_path,
+            tab: options.tab,
+            source: Source::default(),
+            designer: Designer::default(),
+            live: Live::start(&waker, options.paused)?,
+            history: History::default(),
+            friction: FrictionTab::new(options.column_map),
+            commands: Commands::default(),
+            status: Status::default(),
+            recent: Recent::default(),
+            recent_job: Some(Job::start("recent-files", &waker, |_| read_recent())?),
+            dialog: None,
+            model_job: None,
+            state_out,
+            waker,
+            frame_interval: Duration::from_millis(33),
+            frame_cpu_s: None,
+        };
+        app.designer.update(&app.session);
+        app.designer.note_drag_start();
+        app.reset_live();
+        if let Some(log) = options.log {
+            app.commands.send(Command::LoadLog(log));
+        }
+        Ok(app)
+    }
+
+    /// Applies what views asked for, and takes in what threads have brought. Draws nothing.
+    pub fn logic(&mut self, ctx: &Context) {
+        self.drain_live();
+        self.drain_jobs();
+        self.take_dropped_files(ctx);
+        for command in self.commands.take() {
+            self.apply(command, ctx);
+        }
+        if self.designer.update(&self.session) {
+            self.send_controller();
+        }
+        self.write_state(ctx);
+    }
+
+    /// Draws the window.
+    pub fn ui(&mut self, ui: &mut Ui) {
+        self.shell_ui(ui);
+        if !self.commands.is_empty() {
+            // Drawn again in this same frame, after `logic` has applied them.
+            ui.ctx().request_discard("commands change what is shown");
+        }
+    }
+
+    fn page_ui(&mut self, ui: &mut Ui) {
+        let context = ViewContext {
+            session: &self.session,
+            designer: &self.designer,
+            history: &self.history,
+            live: &self.live.status,
+            recent: &self.recent,
+            source: self.source,
+            commands: &self.commands,
+        };
+        match self.tab {
+            Tab::Tune => self.tune.ui(&context, ui),
+            Tab::Friction => self.friction.ui(&context, ui),
+        }
+    }
+
+    fn drain_live(&mut self) {
+        let samples = self.live.poll();
+        if !samples.is_empty() {
+            self.history.extend(&samples);
+        }
+    }
+
+    fn drain_jobs(&mut self) {
+        if let Some(message) = self.friction.drain() {
+            self.say(message);
+        }
+        if let Some(job) = &mut self.recent_job {
+            match job.poll().1 {
+                Outcome::Running => {}
+                Outcome::Done(read) => {
+                    self.friction.suggest_column_map(&read.column_map);
+                    self.recent = read;
+                    self.recent_job = None;
+                }
+                Outcome::Broken => self.recent_job = None,
+            }
+        }
+        self.drain_dialog();
+        self.drain_model_job();
+    }
+
+    fn drain_dialog(&mut self) {
+        let Some(dialog) = &mut self.dialog else { return };
+        let purpose = dialog.purpose;
+        let answer = match dialog.job.poll().1 {
+            Outcome::Running => return,
+            Outcome::Done(answer) => answer,
+            Outcome::Broken => {
+                Answer::Unavailable("The file dialog failed: type the path instead.".to_owned())
+            }
+        };
+        self.dialog = None;
+        match answer {
+            Answer::Chosen(path) => self.commands.send(apply::chosen(purpose, path)),
+            Answer::Cancelled => {}
+            Answer::Unavailable(problem) => {
+                self.fail(problem.clone());
+                self.tune.note_dialog_problem(purpose, &problem);
+                self.friction.note_dialog_problem(purpose, &problem);
+            }
+        }
+    }
+
+    /// A job to run without its result, for the small files that the program keeps.
+    fn save_recent(&mut self) {
+        self.recent.column_map = self.friction.column_map().to_owned();
+        let Some(path) = recent::file() else { return };
+        let text = self.recent.to_json();
+        // Losing the list is no reason to bother anyone.
+        std::thread::Builder::new()
+            .name("save-recent".to_owned())
+            .spawn(move || recent::write_file(&path, &text).ok())
+            .ok();
+    }
+
+    fn say(&mut self, text: impl Into<String>) {
+        self.status = Status { text: text.into(), is_error: false };
+    }
+
+    fn fail(&mut self, text: impl Into<String>) {
+        self.status = Status { text: text.into(), is_error: true };
+    }
+
+    fn reset_live(&mut self) {
+        self.history.clear();
+        self.tune.reset_view();
+        if let Some((robot, controller)) = self.robot_and_controller() {
+            self.live.send(LiveCommand::Reset(Box::new(robot), controller));
+        }
+    }
+
+    fn send_robot(&mut self) {
+        if let Some((robot, controller)) = self.robot_and_controller() {
+            self.live.send(LiveCommand::Robot(Box::new(robot), controller));
+        }
+    }
+
+    fn send_controller(&mut self) {
+        if let Some((_, controller)) = self.robot_and_controller() {
+            self.live.send(LiveCommand::Controller(controller));
+        }
+    }
+
+    fn robot_and_controller(
+        &self,
+    ) -> Option<(flqr_core::model_file::RobotModel, flqr_core::control::BalanceController)> {
+        let gain = self.designer.in_force?.design.gain;
+        Some((*self.session.robot()?, self.session.balance_controller(gain)?))
+    }
+
+    fn write_state(&mut self, ctx: &Context) {
+        let Some(out) = &self.state_out else { return };
+        if let Some(wait) = out.wait() {
+            ctx.request_repaint_after(wait);
+            return;
+        }
+        let state = self.snapshot();
+        if let Some(out) = &mut self.state_out {
+            out.write(state);
+        }
+    }
+
+    /// What the window shows, as `--state-out` writes it.
+    pub fn snapshot(&self) -> serde_json::Value {
+        let weights = self.session.weights();
+        let design = self.designer.in_force.map(|designed| designed.design);
+        let tab = match self.tab {
+            Tab::Tune => "tune",
+            Tab::Friction => "friction",
+        };
+        let source = match self.source {
+            Source::Simulated => "simulated",
+            Source::Can => "can",
+        };
+        let controller = match self.session.controller {
+            ControllerKind::Lqr => "lqr",
+            ControllerKind::Flqr => "flqr",
+        };
+        let gain = design.map(|d| [0, 1].map(|row| [0, 1, 2, 3].map(|column| d.gain[(row, column)])));
+        let poles = design.map(|d| d.poles.map(|pole| [pole.re, pole.im]));
+        let friction = [0, 1].map(|motor| self.session.friction(motor).map(|curve| *curve.parameters()));
+        serde_json::json!({
+            "model": self.session.name,
+            "unsaved_changes": self.session != self.saved,
+            "tab": tab,
+            "source": source,
+            "controller": controller,
+            "q_diagonal": weights.q.diagonal().as_slice(),
+            "r_diagonal": weights.r.diagonal().as_slice(),
+            "gain": gain,
+            "poles": poles,
+            "design_problem": self.designer.problem,
+            "friction": friction,
+            "simulation": {
+                "paused": self.live.status.paused,
+                "fell": self.live.status.fell,
+                "seconds": self.history.end_s().floor(),
+                "lost_samples": self.live.status.lost_samples,
+            },
+            "friction_tab": self.friction.snapshot(),
+            "message": self.status.text,
+        })
+    }
+}
+
+fn read_recent() -> Recent {
+    let text = recent::file().and_then(|path| std::fs::read_to_string(path).ok());
+    text.map_or_else(Recent::default, |text| Recent::from_json(&text))
+}
+
+impl eframe::App for App {
+    fn logic(&mut self, ctx: &Context, frame: &mut eframe::Frame) {
+        self.frame_cpu_s = frame.info().cpu_usage;
+        Self::logic(self, ctx);
+    }
+
+    fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
+        Self::ui(self, ui);
+    }
+
+    fn persist_egui_memory(&self) -> bool {
+        false
+    }
+}

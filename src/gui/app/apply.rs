@@ -1,0 +1,300 @@
+//! The one place where commands change the application.
+
+use std::path::{Path, PathBuf};
+
+use egui::Context;
+use flqr_core::model_file::{AxisModel, Model, Rig};
+
+use super::{App, ModelJob, Tab};
+use crate::command::{Command, FilePurpose, Source, Target};
+use crate::dialog::Dialog;
+use crate::job::{Job, Outcome};
+use crate::live::LiveCommand;
+use crate::session::Session;
+use crate::tune::PRESETS;
+
+/// A model file larger than this is none.
+const LARGEST_MODEL_BYTES: u64 = 1 << 20;
+/// Time between batches of the running robot while its plots are not shown.
+const HIDDEN_INTERVAL: std::time::Duration = std::time::Duration::from_millis(500);
+
+/// What to do with a chosen file.
+pub(super) fn chosen(purpose: FilePurpose, path: PathBuf) -> Command {
+    match purpose {
+        FilePurpose::OpenModel => Command::LoadModel(path),
+        FilePurpose::SaveModel => Command::SaveModel(path),
+        FilePurpose::OpenLog => Command::LoadLog(path),
+    }
+}
+
+impl App {
+    pub(super) fn apply(&mut self, command: Command, ctx: &Context) {
+        match command {
+            Command::SelectTab(tab) => {
+                self.tab = tab;
+                self.set_live_interval();
+            }
+            Command::SelectSource(source) => self.select_source(source),
+            Command::SetWeights(weights) => {
+                if let Some(robot) = self.session.robot_mut() {
+                    robot.weights = Some(weights);
+                }
+            }
+            Command::BeginWeightDrag => self.designer.note_drag_start(),
+            Command::KeepReference => {
+                self.designer.reference = self.designer.in_force;
+                self.designer.reference_is_kept = true;
+            }
+            Command::ReleaseReference => self.designer.reference_is_kept = false,
+            Command::RestoreReference => self.restore_reference(),
+            Command::ResetWeights => self.reset_weights(),
+            Command::SetParameters(parameters) => {
+                if let Some(robot) = self.session.robot_mut() {
+                    robot.parameters = parameters;
+                }
+                self.designer.update(&self.session);
+                self.send_robot();
+            }
+            Command::SetFriction(friction) => {
+                if let Some(robot) = self.session.robot_mut() {
+                    robot.friction = friction;
+                }
+                self.send_robot();
+            }
+            Command::SetTorqueLimit(limit) => {
+                if let Some(robot) = self.session.robot_mut() {
+                    robot.torque_limit_nm = limit;
+                }
+                self.send_robot();
+            }
+            Command::SetCompensation(compensation) => {
+                if let Some(robot) = self.session.robot_mut() {
+                    robot.compensation = Some(compensation);
+                }
+                self.send_controller();
+            }
+            Command::SetController(kind) => {
+                self.session.controller = kind;
+                self.send_controller();
+            }
+            Command::SetPaused(paused) => self.live.send(LiveCommand::Pause(paused)),
+            Command::ResetSimulation => self.reset_live(),
+            Command::Push { force_n, duration_s } => {
+                self.live.send(LiveCommand::Push { force_n, duration_s });
+            }
+            Command::SetFrameInterval(interval) => {
+                self.frame_interval = interval;
+                self.set_live_interval();
+            }
+            Command::ShowDialog(purpose) => self.show_dialog(purpose),
+            Command::LoadPreset(number) => self.load_preset(number),
+            Command::LoadModel(path) => self.load_model(path),
+            Command::SaveModel(path) => self.save_model(path),
+            Command::LoadLog(path) => self.load_log(&path),
+            Command::CancelLoad => self.friction.cancel_load(),
+            Command::StartFit => self.start_fit(),
+            Command::CancelFit => self.friction.cancel_fit(),
+            Command::UseFit(target) => self.use_fit(target),
+            Command::Say(text) => self.say(text),
+        }
+        ctx.request_repaint();
+    }
+
+    fn set_live_interval(&mut self) {
+        let shown = self.tab == Tab::Tune && self.source == Source::Simulated;
+        let interval = if shown { self.frame_interval } else { HIDDEN_INTERVAL };
+        self.live.send(LiveCommand::Interval(interval));
+    }
+
+    fn select_source(&mut self, source: Source) {
+        if source == self.source {
+            return;
+        }
+        self.source = source;
+        self.set_live_interval();
+        match source {
+            Source::Simulated => self.say("The plots show the simulated robot."),
+            Source::Can => {
+                self.live.send(LiveCommand::Pause(true));
+                self.say("CAN is not connected; the simulated robot is paused.");
+            }
+        }
+    }
+
+    fn restore_reference(&mut self) {
+        let Some(reference) = self.designer.reference else { return };
+        if let Some(robot) = self.session.robot_mut() {
+            robot.weights = Some(reference.weights);
+        }
+        self.say("The weights of A are back.");
+    }
+
+    fn reset_weights(&mut self) {
+        self.designer.note_drag_start();
+        let weights = self.saved.weights();
+        if let Some(robot) = self.session.robot_mut() {
+            robot.weights = Some(weights);
+        }
+        self.say("The weights are those of the loaded model again.");
+    }
+
+    fn show_dialog(&mut self, purpose: FilePurpose) {
+        if self.dialog.is_some() {
+            self.say("A file dialog is open already.");
+            return;
+        }
+        let name = self.model_path.as_deref().and_then(Path::file_name);
+        let suggestion = name.map_or_else(|| "model.toml".to_owned(), |name| name.to_string_lossy().into_owned());
+        match Dialog::open(purpose, suggestion, &self.waker) {
+            Ok(dialog) => self.dialog = Some(dialog),
+            Err(error) => self.fail(format!("No thread for a file dialog: {error}.")),
+        }
+    }
+
+    fn load_preset(&mut self, number: usize) {
+        let Some((name, text)) = PRESETS.get(number) else { return };
+        match Model::from_toml(text, name) {
+            Ok(model) => self.open_model(model, None),
+            Err(error) => self.fail(error.to_string()),
+        }
+    }
+
+    fn open_model(&mut self, model: Model, path: Option<PathBuf>) {
+        self.session = Session::new(model, self.session.controller);
+        self.saved = self.session.clone();
+        self.model_path = path;
+        self.tune.load(&self.session, self.model_path.as_deref());
+        self.designer = crate::design::Designer::default();
+        self.designer.update(&self.session);
+        self.designer.note_drag_start();
+        self.reset_live();
+        if let Some(path) = self.model_path.clone() {
+            self.recent.note_model(&path);
+            self.save_recent();
+        }
+        self.say(format!("“{}” is loaded.", self.session.name));
+    }
+
+    fn load_model(&mut self, path: PathBuf) {
+        let file = path.clone();
+        match Job::start("load-model", &self.waker, move |_| read_model(&file)) {
+            Ok(job) => self.model_job = Some(ModelJob::Load(path, job)),
+            Err(error) => self.fail(format!("No thread to load the model: {error}.")),
+        }
+    }
+
+    fn save_model(&mut self, path: PathBuf) {
+        let path = if path.extension().is_none() { path.with_extension("toml") } else { path };
+        let (file, text) = (path.clone(), self.session.model().to_toml());
+        let write = move |_: &crate::job::Reporter<()>| {
+            crate::recent::write_file(&file, &text)
+                .map_err(|error| format!("{} could not be saved: {error}; nothing was changed", file.display()))
+        };
+        match Job::start("save-model", &self.waker, write) {
+            Ok(job) => self.model_job = Some(ModelJob::Save(path, self.session.clone(), job)),
+            Err(error) => self.fail(format!("No thread to save the model: {error}.")),
+        }
+    }
+
+    pub(super) fn drain_model_job(&mut self) {
+        match self.model_job.take() {
+            None => {}
+            Some(ModelJob::Load(path, mut job)) => match job.poll().1 {
+                Outcome::Running => self.model_job = Some(ModelJob::Load(path, job)),
+                Outcome::Done(Ok(model)) => self.open_model(model, Some(path)),
+                Outcome::Done(Err(problem)) => {
+                    self.tune.note_file_problem(&problem);
+                    self.fail(problem);
+                }
+                Outcome::Broken => self.fail("Loading the model failed: this is a defect of flqr."),
+            },
+            Some(ModelJob::Save(path, session, mut job)) => match job.poll().1 {
+                Outcome::Running => self.model_job = Some(ModelJob::Save(path, session, job)),
+                Outcome::Done(Ok(())) => self.note_saved(path, session),
+                Outcome::Done(Err(problem)) => {
+                    self.tune.note_file_problem(&problem);
+                    self.fail(problem);
+                }
+                Outcome::Broken => self.fail("Saving the model failed: this is a defect of flqr."),
+            },
+        }
+    }
+
+    fn note_saved(&mut self, path: PathBuf, session: Session) {
+        self.say(format!("Saved to {}.", path.display()));
+        self.saved = session;
+        self.recent.note_model(&path);
+        self.tune.note_saved(&path);
+        self.model_path = Some(path);
+        self.save_recent();
+    }
+
+    fn load_log(&mut self, path: &Path) {
+        match self.friction.load(path, &self.waker) {
+            Ok(()) => {
+                self.recent.note_log(path);
+                self.save_recent();
+            }
+            Err(problem) => self.fail(problem),
+        }
+    }
+
+    fn start_fit(&mut self) {
+        if let Err(problem) = self.friction.start_fit(self.session.model(), &self.waker) {
+            self.fail(problem);
+        }
+    }
+
+    fn use_fit(&mut self, target: Target) {
+        let Some(curve) = self.friction.fitted_curve() else { return };
+        match &mut self.session.rig {
+            Rig::Robot(robot) => {
+                if target != Target::Right {
+                    robot.friction[0] = Some(curve);
+                }
+                if target != Target::Left {
+                    robot.friction[1] = Some(curve);
+                }
+                self.say(match target {
+                    Target::Left => "The left motor has the fitted friction, the simulated robot too.",
+                    Target::Right => "The right motor has the fitted friction, the simulated robot too.",
+                    Target::Both => "Both motors have the fitted friction, the simulated robot too.",
+                });
+            }
+            Rig::Axis(AxisModel::Rotary { friction, .. } | AxisModel::Linear { friction, .. }) => {
+                *friction = Some(curve);
+                self.say("The axis has the fitted friction.");
+            }
+        }
+        self.tune.refresh(&self.session);
+        self.send_robot();
+    }
+
+    pub(super) fn take_dropped_files(&mut self, ctx: &Context) {
+        let files = ctx.input(|input| {
+            input.raw.dropped_files.iter().map(|file| file.path().to_owned()).collect::<Vec<_>>()
+        });
+        let Some(path) = files.into_iter().next() else { return };
+        if path.extension().is_some_and(|extension| extension == "toml") {
+            self.commands.send(Command::LoadModel(path));
+        } else {
+            self.commands.send(Command::SelectTab(Tab::Friction));
+            self.commands.send(Command::LoadLog(path));
+        }
+    }
+}
+
+fn read_model(path: &Path) -> Result<Model, String> {
+    let problem = |error: std::io::Error| {
+        format!("{} could not be opened: {error}; check the path", path.display())
+    };
+    let size = std::fs::metadata(path).map_err(problem)?.len();
+    if size > LARGEST_MODEL_BYTES {
+        return Err(format!(
+            "{} is no model file: it has {size} bytes, at most {LARGEST_MODEL_BYTES} are read; choose a TOML file",
+            path.display()
+        ));
+    }
+    let text = std::fs::read_to_string(path).map_err(problem)?;
+    Model::from_toml(&text, &path.display().to_string()).map_err(|error| error.to_string())
+}

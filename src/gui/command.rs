@@ -1,0 +1,96 @@
+//! What views ask for; applied at one place, `App::logic`.
+
+use std::cell::RefCell;
+use std::path::PathBuf;
+
+use flqr_core::control::ControllerKind;
+use flqr_core::friction::{Compensation, Stribeck};
+use flqr_core::lqr::Weights;
+use flqr_core::robot::RobotParameters;
+
+use crate::app::Tab;
+
+/// Where measured values come from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Source {
+    /// The simulated robot.
+    #[default]
+    Simulated,
+    /// A robot on a CAN bus.
+    Can,
+}
+
+/// Which motors a fitted curve goes to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Target {
+    Left,
+    Right,
+    Both,
+}
+
+/// What a file dialog is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum FilePurpose {
+    OpenModel,
+    SaveModel,
+    OpenLog,
+}
+
+/// One wish of a view.
+#[derive(Clone, Debug)]
+pub(crate) enum Command {
+    SelectTab(Tab),
+    SelectSource(Source),
+    SetWeights(Weights),
+    /// A drag of a weight begins: the gains of now are the ones to compare with.
+    BeginWeightDrag,
+    /// Keeps the gains of now as A, whatever is dragged later.
+    KeepReference,
+    /// The comparison follows the start of each drag again.
+    ReleaseReference,
+    /// Goes back to the weights of A.
+    RestoreReference,
+    /// Goes back to the weights of the loaded model.
+    ResetWeights,
+    SetParameters(RobotParameters),
+    SetFriction([Option<Stribeck>; 2]),
+    SetTorqueLimit(Option<f64>),
+    SetCompensation(Compensation),
+    SetController(ControllerKind),
+    SetPaused(bool),
+    ResetSimulation,
+    Push {
+        force_n: f64,
+        duration_s: f64,
+    },
+    SetFrameInterval(std::time::Duration),
+    ShowDialog(FilePurpose),
+    LoadPreset(usize),
+    LoadModel(PathBuf),
+    SaveModel(PathBuf),
+    LoadLog(PathBuf),
+    CancelLoad,
+    StartFit,
+    CancelFit,
+    UseFit(Target),
+    /// One sentence for the status line.
+    Say(String),
+}
+
+/// The wishes of this pass.
+#[derive(Default)]
+pub(crate) struct Commands(RefCell<Vec<Command>>);
+
+impl Commands {
+    pub(crate) fn send(&self, command: Command) {
+        self.0.borrow_mut().push(command);
+    }
+
+    pub(crate) fn take(&self) -> Vec<Command> {
+        self.0.take()
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.0.borrow().is_empty()
+    }
+}

@@ -1,0 +1,19 @@
+//! What a view may read during one frame.
+
+use crate::command::{Commands, Source};
+use crate::design::Designer;
+use crate::history::History;
+use crate::live::LiveStatus;
+use crate::recent::Recent;
+use crate::session::Session;
+
+/// Read access for views, and the way to ask for changes.
+pub(crate) struct ViewContext<'a> {
+    pub(crate) session: &'a Session,
+    pub(crate) designer: &'a Designer,
+    pub(crate) history: &'a History,
+    pub(crate) live: &'a LiveStatus,
+    pub(crate) recent: &'a Recent,
+    pub(crate) source: Source,
+    pub(crate) commands: &'a Commands,
+}

@@ -1,0 +1,86 @@
+//! File dialogs on a thread of their own, and an honest word when the desktop has none.
+//!
+//! Without a desktop portal the dialog library returns the same "nothing chosen" as for Cancel, at once. So
+//! the portal is looked for first, and an answer faster than a person can give counts as a failure.
+
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use crate::command::FilePurpose;
+use crate::job::{Job, Waker};
+
+/// Nobody sees and cancels a dialog faster than this.
+const FASTEST_PERSON: Duration = Duration::from_millis(150);
+
+/// What a dialog came back with.
+#[derive(Debug, PartialEq)]
+pub(crate) enum Answer {
+    Chosen(PathBuf),
+    Cancelled,
+    /// No dialog appeared; one sentence says why and what to do.
+    Unavailable(String),
+}
+
+/// An open dialog.
+pub(crate) struct Dialog {
+    pub(crate) purpose: FilePurpose,
+    pub(crate) job: Job<(), Answer>,
+}
+
+impl Dialog {
+    /// Opens a dialog; `suggestion` is the file name offered for saving.
+    pub(crate) fn open(purpose: FilePurpose, suggestion: String, waker: &Waker) -> std::io::Result<Self> {
+        let job = Job::start("file-dialog", waker, move |_| ask(purpose, &suggestion))?;
+        Ok(Self { purpose, job })
+    }
+}
+
+fn ask(purpose: FilePurpose, suggestion: &str) -> Answer {
+    if let Some(problem) = missing_portal() {
+        return Answer::Unavailable(problem);
+    }
+    let start = Instant::now();
+    let dialog = rfd::FileDialog::new();
+    let chosen = match purpose {
+        FilePurpose::OpenModel => dialog.set_title("Open a model").add_filter("Model", &["toml"]).pick_file(),
+        FilePurpose::SaveModel => dialog.set_title("Save the model").set_file_name(suggestion).save_file(),
+        FilePurpose::OpenLog => dialog.set_title("Open a log").add_filter("Log", &["csv", "txt"]).pick_file(),
+    };
+    match chosen {
+        Some(path) => Answer::Chosen(path),
+        None if start.elapsed() < FASTEST_PERSON => Answer::Unavailable(
+            "The desktop's file dialog did not open (its portal may be missing or broken): type the path instead, or drop the file onto the window.".to_owned(),
+        ),
+        None => Answer::Cancelled,
+    }
+}
+
+#[cfg(not(target_os = "linux"))]
+fn missing_portal() -> Option<String> {
+    None
+}
+
+/// Why there can be no dialog: no session bus, or nothing on it that offers one.
+#[cfg(target_os = "linux")]
+fn missing_portal() -> Option<String> {
+    let set = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty());
+    let on_path = |program: &str| {
+        set("PATH").is_some_and(|path| std::env::split_paths(&path).any(|dir| dir.join(program).is_file()))
+    };
+    if on_path("zenity") {
+        return None;
+    }
+    let bus = set("DBUS_SESSION_BUS_ADDRESS").is_some()
+        || set("XDG_RUNTIME_DIR").is_some_and(|dir| PathBuf::from(dir).join("bus").exists());
+    if !bus {
+        return Some(
+            "There is no file dialog here (no session bus for a desktop portal): type the path instead, or drop the file onto the window.".to_owned(),
+        );
+    }
+    let directories =
+        set("XDG_DATA_DIRS").unwrap_or_else(|| std::ffi::OsString::from("/usr/local/share:/usr/share"));
+    let service = "dbus-1/services/org.freedesktop.portal.Desktop.service";
+    (!std::env::split_paths(&directories).any(|dir| dir.join(service).is_file())).then(|| {
+        "There is no file dialog here (xdg-desktop-portal is not installed): type the path instead, or drop the file onto the window.".to_owned()
+    })
+}

@@ -1,0 +1,249 @@
+//! A fit on a worker thread, with live convergence and cancel.
+
+use std::sync::Arc;
+
+use egui::{ProgressBar, RichText, TextEdit, Ui};
+use flqr_core::friction::{Stribeck, StribeckParameters};
+use flqr_core::identify::{Bounds, FitOptions, FitProgress, FitReport, Method, Motor, fit};
+use flqr_core::model_file::Model;
+
+use super::load::LoadedLog;
+use crate::command::Command;
+use crate::context::ViewContext;
+use crate::job::{Job, Outcome, Waker};
+use crate::widgets::{choice_ui, error_ui, hint_ui, section_ui};
+
+/// One report of the optimiser.
+#[derive(Clone, Copy)]
+pub(super) struct Step {
+    iteration: usize,
+    iterations: usize,
+    best_error: f64,
+    best: Option<StribeckParameters>,
+}
+
+/// Options, the running fit, and the last result.
+pub(super) struct FitRun {
+    motor: Motor,
+    method: Method,
+    bounds: Bounds,
+    seed: u64,
+    estimate: String,
+    job: Option<Job<Step, Result<FitReport, String>>>,
+    /// Iteration and log10 of the best error, for the plot.
+    pub(super) convergence: Vec<[f64; 2]>,
+    last_step: Option<Step>,
+    pub(super) report: Option<FitReport>,
+    problem: Option<String>,
+}
+
+impl Default for FitRun {
+    fn default() -> Self {
+        Self {
+            motor: Motor::Left,
+            method: Method::Best,
+            bounds: Bounds::Data,
+            seed: 1,
+            estimate: String::new(),
+            job: None,
+            convergence: Vec::new(),
+            last_step: None,
+            report: None,
+            problem: None,
+        }
+    }
+}
+
+impl FitRun {
+    pub(super) fn is_running(&self) -> bool {
+        self.job.is_some()
+    }
+
+    pub(super) fn start(&mut self, loaded: &LoadedLog, model: Model, waker: &Waker) -> Result<(), String> {
+        self.discard();
+        let log = Arc::clone(&loaded.log);
+        let motor = self.motor;
+        let options = FitOptions {
+            method: self.method,
+            bounds: self.bounds,
+            estimate: self.names_to_estimate(),
+            seed: self.seed,
+        };
+        let work = move |reporter: &crate::job::Reporter<Step>| {
+            let mut watch = |progress: &FitProgress| {
+                reporter.progress(Step {
+                    iteration: progress.iteration,
+                    iterations: progress.iterations,
+                    best_error: progress.best_error,
+                    best: progress.best,
+                })
+            };
+            fit(std::slice::from_ref(&*log), Some(&model), motor, &options, &mut watch)
+                .map_err(|error| error.to_string())
+        };
+        self.job = Some(Job::start("fit", waker, work).map_err(|e| format!("No thread for the fit: {e}."))?);
+        Ok(())
+    }
+
+    fn names_to_estimate(&self) -> Vec<String> {
+        self.estimate.split([',', ' ']).filter(|name| !name.is_empty()).map(str::to_owned).collect()
+    }
+
+    pub(super) fn cancel(&self) {
+        if let Some(job) = &self.job {
+            job.cancel();
+        }
+    }
+
+    /// Ends the fit and forgets its result; the options stay.
+    pub(super) fn discard(&mut self) {
+        self.job = None;
+        self.convergence.clear();
+        self.last_step = None;
+        self.report = None;
+        self.problem = None;
+    }
+
+    pub(super) fn drain(&mut self) -> Option<String> {
+        let (steps, outcome) = self.job.as_mut()?.poll();
+        for step in steps {
+            self.note_step(step);
+        }
+        let result = match outcome {
+            Outcome::Running => return None,
+            Outcome::Done(result) => result,
+            Outcome::Broken => Err("The fit failed: this is a defect of flqr.".to_owned()),
+        };
+        self.job = None;
+        Some(match result {
+            Ok(report) => {
+                let text = format!("The fit ended with an error of {:.3e} {}.", report.rmse, report.rmse_unit);
+                self.show_history(&report);
+                self.report = Some(report);
+                text
+            }
+            Err(problem) => {
+                self.problem = Some(problem.clone());
+                problem
+            }
+        })
+    }
+
+    fn note_step(&mut self, step: Step) {
+        self.last_step = Some(step);
+        let error = step.best_error.log10();
+        if error.is_finite() {
+            self.convergence.push([step.iteration as f64, error]);
+        }
+    }
+
+    /// Reports may have been dropped on their way; the result has all of them.
+    fn show_history(&mut self, report: &FitReport) {
+        let points = report.history.iter().enumerate().map(|(i, error)| [i as f64, error.log10()]);
+        let points: Vec<_> = points.filter(|point| point[1].is_finite()).collect();
+        if !points.is_empty() {
+            self.convergence = points;
+        }
+    }
+
+    /// The fitted curve, of the result or of the best so far.
+    pub(super) fn curve(&self) -> Option<Stribeck> {
+        let parameters = match &self.report {
+            Some(report) => report.stribeck(),
+            None => self.last_step.and_then(|step| step.best),
+        };
+        Stribeck::new(parameters?).ok()
+    }
+
+    /// The motor whose friction is being fitted: 0 left, 1 right.
+    pub(super) fn motor_index(&self) -> usize {
+        usize::from(self.motor == Motor::Right)
+    }
+
+    pub(super) fn snapshot(&self) -> serde_json::Value {
+        let parameters = self.report.as_ref().map(|report| {
+            let pairs = report.parameters.iter();
+            pairs.map(|(name, estimate)| ((*name).to_string(), serde_json::json!(estimate))).collect()
+        });
+        serde_json::json!({
+            "running": self.is_running(),
+            "problem": self.problem,
+            "iteration": self.last_step.map(|step| step.iteration),
+            "parameters": parameters.map(serde_json::Value::Object),
+            "rmse": self.report.as_ref().map(|report| report.rmse),
+        })
+    }
+
+    pub(super) fn options_ui(&mut self, context: &ViewContext<'_>, has_log: bool, ui: &mut Ui) {
+        section_ui(ui, "Fit", |_| {});
+        ui.add_enabled_ui(!self.is_running(), |ui| {
+            egui::Grid::new("fit").num_columns(2).spacing([12.0, 4.0]).show(ui, |ui| self.choices_ui(ui));
+        });
+        ui.add_space(2.0);
+        ui.horizontal(|ui| self.run_ui(context, has_log, ui));
+        if let Some(problem) = &self.problem {
+            error_ui(ui, problem);
+        }
+    }
+
+    fn choices_ui(&mut self, ui: &mut Ui) {
+        ui.label("motor");
+        ui.horizontal(|ui| {
+            let help = "Of a log of both motors, the one to fit; and the one whose curve is drawn beside it";
+            choice_ui(ui, &mut self.motor, &[(Motor::Left, "left", help), (Motor::Right, "right", help)]);
+        });
+        ui.end_row();
+        ui.label("method");
+        ui.horizontal(|ui| {
+            let choices = [
+                (Method::Best, "swarm and polish", "Particle swarm, then a polish to the true optimum"),
+                (Method::Pso, "swarm alone", "Particle swarm exactly as the paper's Algorithm 1"),
+            ];
+            choice_ui(ui, &mut self.method, &choices);
+        });
+        ui.end_row();
+        ui.label("bounds");
+        ui.horizontal(|ui| {
+            let choices = [
+                (Bounds::Data, "from the data", "Bounds that the measured torques and speeds suggest"),
+                (Bounds::Paper, "the paper's", "Table 3 as printed; known to fail for motors this small"),
+            ];
+            choice_ui(ui, &mut self.bounds, &choices);
+        });
+        ui.end_row();
+        ui.label("seed");
+        ui.add(egui::DragValue::new(&mut self.seed))
+            .accessible_name("seed")
+            .on_hover_text("Same log and same seed: same result");
+        ui.end_row();
+        ui.label("estimate");
+        let field = TextEdit::singleline(&mut self.estimate).hint_text("default").desired_width(180.0);
+        ui.add(field).accessible_name("parameters to estimate").on_hover_text(
+            "Which parameters to free in a fit from motion: “all”, or names as in the model file, separated by commas. Empty: those that the log determines",
+        );
+        ui.end_row();
+    }
+
+    fn run_ui(&self, context: &ViewContext<'_>, has_log: bool, ui: &mut Ui) {
+        if self.is_running() {
+            if ui.button("Cancel fit").on_hover_text("Stop the fit (Ctrl+Enter)").clicked() {
+                context.commands.send(Command::CancelFit);
+            }
+            let share = self.last_step.map_or(0.0, |s| s.iteration as f32 / s.iterations.max(1) as f32);
+            let text = self.last_step.map_or_else(
+                || "starting".to_owned(),
+                |s| format!("iteration {} of {}, error {:.2e}", s.iteration, s.iterations, s.best_error),
+            );
+            ui.add(ProgressBar::new(share).text(RichText::new(text).small()));
+            return;
+        }
+        let start = ui.add_enabled(has_log, egui::Button::new("Start fit"));
+        let start = start.on_hover_text("Fit the friction curve to the log (Ctrl+Enter)");
+        if start.on_disabled_hover_text("Load a log first").clicked() {
+            context.commands.send(Command::StartFit);
+        }
+        if !has_log {
+            hint_ui(ui, "needs a log");
+        }
+    }
+}

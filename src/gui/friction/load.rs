@@ -1,0 +1,167 @@
+//! Loading a log on a worker thread.
+
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use flqr_core::record::{ColumnMap, HealthFinding, Log, LogKind, ReadOptions, data_health, read_log};
+
+use crate::job::{Job, Outcome, Reporter, Waker};
+
+/// A log in memory with what the page says about it.
+pub(super) struct LoadedLog {
+    pub(super) log: Arc<Log>,
+    pub(super) path: PathBuf,
+    /// What it records, or why nothing in it can be fitted.
+    pub(super) kind: Result<LogKind, String>,
+    pub(super) health: Vec<HealthFinding>,
+    /// Horizontal axis of the preview: time where it is usable, else row numbers.
+    pub(super) axis: Axis,
+    /// Rows a second, where there is a time.
+    pub(super) rate_hz: Option<f64>,
+    /// Distinguishes logs, for the plot's cache.
+    pub(super) generation: u64,
+}
+
+/// Horizontal values for the preview.
+pub(super) struct Axis {
+    pub(super) values: Vec<f64>,
+    pub(super) label: &'static str,
+    /// A larger step is a gap.
+    pub(super) gap: f64,
+}
+
+/// How far loading has come.
+#[derive(Clone, Copy)]
+pub(super) struct LoadProgress {
+    pub(super) bytes: u64,
+    pub(super) total_bytes: u64,
+    pub(super) rows: u64,
+}
+
+type LoadResult = Result<Box<LoadedLog>, String>;
+
+/// The log in memory and the one that is being loaded.
+#[derive(Default)]
+pub(super) struct Loader {
+    job: Option<Job<LoadProgress, LoadResult>>,
+    pub(super) progress: Option<LoadProgress>,
+    pub(super) problem: Option<String>,
+    log: Option<Box<LoadedLog>>,
+    generation: u64,
+}
+
+impl Loader {
+    pub(super) fn log(&self) -> Option<&LoadedLog> {
+        self.log.as_deref()
+    }
+
+    pub(super) fn is_running(&self) -> bool {
+        self.job.is_some()
+    }
+
+    pub(super) fn start(&mut self, path: &Path, map: ColumnMap, waker: &Waker) -> Result<(), String> {
+        self.generation += 1;
+        let (path, generation) = (path.to_owned(), self.generation);
+        let job = Job::start("load-log", waker, move |reporter| load(&path, &map, generation, reporter))
+            .map_err(|error| format!("No thread to load the log: {error}."))?;
+        self.job = Some(job);
+        self.progress = None;
+        self.problem = None;
+        Ok(())
+    }
+
+    pub(super) fn cancel(&self) {
+        if let Some(job) = &self.job {
+            job.cancel();
+        }
+    }
+
+    /// The log of before stays until another one is complete.
+    pub(super) fn drain(&mut self) -> Option<String> {
+        let (progress, outcome) = self.job.as_mut()?.poll();
+        self.progress = progress.last().copied().or(self.progress);
+        let result = match outcome {
+            Outcome::Running => return None,
+            Outcome::Done(result) => result,
+            Outcome::Broken => Err("Loading failed: this is a defect of flqr.".to_owned()),
+        };
+        self.job = None;
+        self.progress = None;
+        Some(match result {
+            Ok(loaded) => {
+                let text = format!("{} rows loaded from {}.", loaded.log.rows(), loaded.path.display());
+                self.log = Some(loaded);
+                text
+            }
+            Err(problem) => {
+                self.problem = Some(problem.clone());
+                problem
+            }
+        })
+    }
+
+    pub(super) fn snapshot(&self) -> serde_json::Value {
+        serde_json::json!({
+            "loading": self.is_running(),
+            "problem": self.problem,
+            "path": self.log().map(|loaded| loaded.path.display().to_string()),
+            "rows": self.log().map(|loaded| loaded.log.rows()),
+            "kind": self.log().and_then(|loaded| loaded.kind.as_ref().ok()),
+            "health": self.log().map(|loaded| &loaded.health),
+        })
+    }
+}
+
+fn load(path: &Path, map: &ColumnMap, generation: u64, reporter: &Reporter<LoadProgress>) -> LoadResult {
+    let source = path.display().to_string();
+    let unopened = |error: std::io::Error| format!("{source} could not be opened: {error}; check the path");
+    let file = File::open(path).map_err(unopened)?;
+    let metadata = file.metadata().map_err(unopened)?;
+    if metadata.is_dir() {
+        return Err(format!("{source} is a folder; choose the CSV file in it"));
+    }
+    let total_bytes = metadata.len();
+    let mut watch = |progress: flqr_core::record::ReadProgress| {
+        let rows = progress.rows as u64;
+        reporter.progress(LoadProgress { bytes: progress.bytes, total_bytes, rows })
+    };
+    let reader = BufReader::with_capacity(1 << 16, file);
+    let log = read_log(reader, &source, &ReadOptions::new(map), &mut watch).map_err(|error| error.to_string())?;
+    let health = data_health(&log);
+    Ok(Box::new(LoadedLog {
+        kind: log.kind().map_err(|error| error.to_string()),
+        axis: axis(&log),
+        rate_hz: rate_hz(&log),
+        health,
+        log: Arc::new(log),
+        path: path.to_owned(),
+        generation,
+    }))
+}
+
+fn axis(log: &Log) -> Axis {
+    let usable = |time: &&[f64]| {
+        time.iter().all(|value| value.is_finite()) && time.windows(2).all(|pair| pair[0] <= pair[1])
+    };
+    match log.column("time_s").filter(usable) {
+        Some(time) => {
+            Axis { values: time.to_vec(), label: "time [s]", gap: 10.0 * median_step(time).unwrap_or(1.0) }
+        }
+        None => {
+            Axis { values: (0..log.rows()).map(|row| row as f64).collect(), label: "row", gap: f64::INFINITY }
+        }
+    }
+}
+
+fn median_step(time: &[f64]) -> Option<f64> {
+    let mut steps: Vec<f64> =
+        time.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| step.is_finite() && *step > 0.0).collect();
+    let middle = steps.len() / 2;
+    (!steps.is_empty()).then(|| *steps.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
+fn rate_hz(log: &Log) -> Option<f64> {
+    median_step(log.column("time_s")?).map(f64::recip)
+}

@@ -1,0 +1,136 @@
+//! The *Friction* page: a log at the left, its picture and the fit in the middle, the result at the right.
+
+mod charts;
+mod fit;
+mod load;
+mod preview;
+mod result;
+mod source;
+
+use std::path::Path;
+
+use egui::{CentralPanel, Frame, Margin, Panel, ScrollArea, Ui};
+use flqr_core::friction::Stribeck;
+use flqr_core::model_file::Model;
+
+use crate::command::FilePurpose;
+use crate::context::ViewContext;
+use crate::job::Waker;
+use fit::FitRun;
+use load::Loader;
+use preview::Preview;
+use source::SourceForm;
+
+/// State of the page.
+pub(crate) struct FrictionTab {
+    source: SourceForm,
+    loader: Loader,
+    preview: Preview,
+    fit: FitRun,
+}
+
+impl FrictionTab {
+    pub(crate) fn new(column_map: String) -> Self {
+        Self {
+            source: SourceForm::new(column_map),
+            loader: Loader::default(),
+            preview: Preview::default(),
+            fit: FitRun::default(),
+        }
+    }
+
+    pub(crate) fn column_map(&self) -> &str {
+        &self.source.column_map
+    }
+
+    /// Fills the column map in, unless the user has typed one.
+    pub(crate) fn suggest_column_map(&mut self, map: &str) {
+        if self.source.column_map.is_empty() && self.loader.log().is_none() && !self.loader.is_running() {
+            map.clone_into(&mut self.source.column_map);
+        }
+    }
+
+    pub(crate) fn focus_path(&mut self) {
+        self.source.focus_path = true;
+    }
+
+    pub(crate) fn note_dialog_problem(&mut self, purpose: FilePurpose, problem: &str) {
+        if purpose == FilePurpose::OpenLog {
+            self.source.dialog_problem = Some(problem.to_owned());
+        }
+    }
+
+    /// Starts loading; a fit of the log of before is cancelled.
+    pub(crate) fn load(&mut self, path: &Path, waker: &Waker) -> Result<(), String> {
+        self.source.path = path.display().to_string();
+        self.source.dialog_problem = None;
+        let map = self.source.parse_column_map()?;
+        self.loader.start(path, map, waker)?;
+        self.fit.discard();
+        self.preview = Preview::default();
+        Ok(())
+    }
+
+    pub(crate) fn cancel_load(&self) {
+        self.loader.cancel();
+    }
+
+    pub(crate) fn start_fit(&mut self, model: Model, waker: &Waker) -> Result<(), String> {
+        let Some(loaded) = self.loader.log() else {
+            return Err("There is no log to fit: load one first.".to_owned());
+        };
+        self.fit.start(loaded, model, waker)
+    }
+
+    pub(crate) fn cancel_fit(&self) {
+        self.fit.cancel();
+    }
+
+    pub(crate) fn fit_is_running(&self) -> bool {
+        self.fit.is_running()
+    }
+
+    /// The curve of the last fit, if it is one that a motor can have.
+    pub(crate) fn fitted_curve(&self) -> Option<Stribeck> {
+        self.fit.curve()
+    }
+
+    /// Takes in what the workers have brought; a sentence if something ended.
+    pub(crate) fn drain(&mut self) -> Option<String> {
+        let loaded = self.loader.drain();
+        self.fit.drain().or(loaded)
+    }
+
+    pub(crate) fn snapshot(&self) -> serde_json::Value {
+        serde_json::json!({ "log": self.loader.snapshot(), "fit": self.fit.snapshot() })
+    }
+
+    pub(crate) fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
+        let side = Frame::side_top_panel(ui.style()).inner_margin(Margin::symmetric(10, 6));
+        Panel::left("log").frame(side).resizable(true).default_size(330.0).size_range(280.0..=480.0).show(
+            ui,
+            |ui| {
+                ScrollArea::vertical().show(ui, |ui| {
+                    self.source.ui(context, &self.loader, ui);
+                    source::health_ui(&self.loader, ui);
+                    self.fit.options_ui(context, self.loader.log().is_some(), ui);
+                });
+            },
+        );
+        Panel::right("result").frame(side).resizable(true).default_size(300.0).size_range(250.0..=460.0).show(
+            ui,
+            |ui| {
+                ScrollArea::vertical().show(ui, |ui| result::ui(context, &self.fit, ui));
+            },
+        );
+        let middle = Frame::central_panel(ui.style()).inner_margin(Margin::symmetric(10, 6));
+        CentralPanel::default().frame(middle).show(ui, |ui| {
+            let half = 0.5 * ui.available_height();
+            ui.allocate_ui(egui::vec2(ui.available_width(), half), |ui| {
+                ui.set_min_height(half);
+                self.preview.ui(&self.loader, ui);
+            });
+            charts::ui(context, &self.fit, ui);
+        });
+    }
+}

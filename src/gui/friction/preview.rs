@@ -1,0 +1,168 @@
+//! What is in the log: kind, rate, columns, first rows, and one column as a plot.
+
+use egui::{ComboBox, RichText, ScrollArea, Ui};
+use flqr_core::record::LogKind;
+
+use super::load::{LoadedLog, Loader};
+use crate::plot::{Curve, DecimationCache, TimePlot, TimeView};
+use crate::theme::palette;
+use crate::widgets::{choice_ui, hint_ui, mono, section_ui, shown};
+
+const FIRST_ROWS: usize = 12;
+
+#[derive(Clone, Copy, PartialEq)]
+enum Show {
+    Plot,
+    Rows,
+}
+
+/// State of the preview.
+pub(super) struct Preview {
+    show: Show,
+    column: Option<usize>,
+    view: TimeView,
+    /// The log that the view was fitted to.
+    fitted_to: u64,
+    cache: DecimationCache,
+}
+
+impl Default for Preview {
+    fn default() -> Self {
+        Self {
+            show: Show::Plot,
+            column: None,
+            view: TimeView::following(1.0),
+            fitted_to: 0,
+            cache: DecimationCache::default(),
+        }
+    }
+}
+
+impl Preview {
+    pub(super) fn ui(&mut self, loader: &Loader, ui: &mut Ui) {
+        section_ui(ui, "Measured", |ui| {
+            if let Some(loaded) = loader.log() {
+                self.controls_ui(loaded, ui);
+            }
+        });
+        let Some(loaded) = loader.log() else {
+            empty_ui(ui);
+            return;
+        };
+        hint_ui(ui, summary(loaded));
+        match self.show {
+            Show::Plot => self.plot_ui(loaded, ui),
+            Show::Rows => rows_ui(loaded, ui),
+        }
+    }
+
+    fn controls_ui(&mut self, loaded: &LoadedLog, ui: &mut Ui) {
+        ui.scope(|ui| {
+            let choices =
+                [(Show::Rows, "Rows", "The first rows as numbers"), (Show::Plot, "Plot", "One column as a curve")];
+            choice_ui(ui, &mut self.show, &choices);
+        });
+        if self.show == Show::Rows {
+            return;
+        }
+        if ui.button("Whole log").on_hover_text("Show the log from its start to its end").clicked() {
+            self.fitted_to = 0;
+        }
+        let column = self.column(loaded);
+        let name = &loaded.log.columns[column].name;
+        let combo = ComboBox::from_id_salt("column").selected_text(name).width(170.0).show_ui(ui, |ui| {
+            for (index, column) in loaded.log.columns.iter().enumerate() {
+                ui.selectable_value(&mut self.column, Some(index), &column.name);
+            }
+        });
+        combo.response.on_hover_text("The column to show").accessible_name("column");
+    }
+
+    /// The chosen column, at first the one that matters for friction.
+    fn column(&self, loaded: &LoadedLog) -> usize {
+        let position = |name: &str| loaded.log.columns.iter().position(|column| column.name == name);
+        let first = || {
+            ["torque_nm", "force_n", "torque_left_nm"].into_iter().find_map(position).unwrap_or(0)
+        };
+        self.column.filter(|column| *column < loaded.log.columns.len()).unwrap_or_else(first)
+    }
+
+    fn plot_ui(&mut self, loaded: &LoadedLog, ui: &mut Ui) {
+        let column = self.column(loaded);
+        let Some(column_data) = loaded.log.columns.get(column) else { return };
+        let axis = &loaded.axis.values;
+        let data = [axis.first().copied().unwrap_or(0.0), axis.last().copied().unwrap_or(1.0)];
+        if self.fitted_to != loaded.generation {
+            self.fitted_to = loaded.generation;
+            self.view.show_all(data);
+        }
+        self.view.follow = false;
+        self.view.update(data);
+        let plot = TimePlot {
+            id: "preview",
+            label: &column_data.name,
+            color: palette(ui.visuals()).channels[0],
+            height: ui.available_height() - 24.0,
+            x_label: Some(loaded.axis.label),
+            min_y_span: 1e-6,
+        };
+        let curve = Curve { x: axis, y: &column_data.values, scale: 1.0, gap: loaded.axis.gap };
+        // A log has fewer than 2^16 columns; the pair identifies the data.
+        let generation = (loaded.generation << 16) | column as u64;
+        let statistics = plot.show(ui, &mut self.view, &mut self.cache, curve, generation);
+        if let Some(s) = statistics {
+            let text = format!(
+                "visible: mean {}, std {}, peak to peak {}, {} samples",
+                shown(s.mean, 4),
+                shown(s.std, 4),
+                shown(s.peak_to_peak(), 4),
+                s.count
+            );
+            ui.label(RichText::new(text).small().monospace());
+        }
+    }
+}
+
+fn empty_ui(ui: &mut Ui) {
+    ui.add_space(0.3 * ui.available_height());
+    ui.vertical_centered(|ui| {
+        ui.label("No log yet.");
+        hint_ui(ui, "Open, type or drop a CSV file whose columns carry their units, such as:");
+        for columns in [
+            "time_s, motor_angle_rad, torque_nm",
+            "speed_rad_s, torque_nm",
+            "time_s, position_m, force_n",
+        ] {
+            ui.label(mono(columns));
+        }
+    });
+}
+
+fn summary(loaded: &LoadedLog) -> String {
+    let kind = match &loaded.kind {
+        Ok(LogKind::Bench) => "bench log of one motor",
+        Ok(LogKind::LinearAxis) => "log of a linear axis",
+        Ok(LogKind::Robot) => "robot log",
+        Ok(LogKind::FrictionPairs) => "friction pairs",
+        Err(_) => "unknown kind",
+    };
+    let rate = loaded.rate_hz.map(|rate| format!(", {} Hz", shown(rate, 4))).unwrap_or_default();
+    format!("{kind}: {} rows, {} columns{rate}", loaded.log.rows(), loaded.log.columns.len())
+}
+
+fn rows_ui(loaded: &LoadedLog, ui: &mut Ui) {
+    ScrollArea::both().show(ui, |ui| {
+        egui::Grid::new("rows").striped(true).spacing([16.0, 3.0]).show(ui, |ui| {
+            for column in &loaded.log.columns {
+                ui.label(RichText::new(&column.name).small().strong());
+            }
+            ui.end_row();
+            for row in 0..FIRST_ROWS.min(loaded.log.rows()) {
+                for column in &loaded.log.columns {
+                    ui.label(mono(column.values.get(row).map_or_else(String::new, |v| shown(*v, 6))));
+                }
+                ui.end_row();
+            }
+        });
+    });
+}

@@ -1,0 +1,111 @@
+//! The result: parameters with intervals, warnings, and the way into the model.
+
+use egui::{Grid, RichText, Ui};
+use flqr_core::identify::{FitReport, StopReason};
+
+use super::fit::FitRun;
+use crate::command::{Command, Target};
+use crate::context::ViewContext;
+use crate::widgets::{hint_ui, mono, section_ui, shown, warning_ui};
+
+/// Names for people and units of the keys of the model file.
+const NAMES: &[(&str, &str, &str)] = &[
+    ("coulomb_nm", "Coulomb", "N m"),
+    ("static_nm", "static", "N m"),
+    ("viscous_nm_s_rad", "viscous", "N m s/rad"),
+    ("stribeck_speed_rad_s", "Stribeck speed", "rad/s"),
+    ("stribeck_exponent", "exponent", ""),
+    ("offset_nm", "offset", "N m"),
+    ("inertia_kg_m2", "inertia", "kg m²"),
+    ("gravity_torque_nm", "gravity torque", "N m"),
+    ("mass_kg", "mass", "kg"),
+    ("coulomb_n", "Coulomb", "N"),
+    ("static_n", "static", "N"),
+    ("viscous_n_s_m", "viscous", "N s/m"),
+    ("stribeck_speed_m_s", "Stribeck speed", "m/s"),
+    ("offset_n", "offset", "N"),
+];
+
+pub(super) fn ui(context: &ViewContext<'_>, fit: &FitRun, ui: &mut Ui) {
+    section_ui(ui, "Result", |_| {});
+    let Some(report) = &fit.report else {
+        hint_ui(ui, "The parameters appear here, each with its 95 % interval, once a fit has ended.");
+        return;
+    };
+    parameters_ui(report, ui);
+    ui.add_space(4.0);
+    hint_ui(
+        ui,
+        format!(
+            "error {} {} ({} % of the signal), {} pairs, {} iterations, {}",
+            shown(report.rmse, 4),
+            report.rmse_unit,
+            shown(100.0 * report.relative_error, 3),
+            report.pairs.len(),
+            report.iterations,
+            stop_text(report.stop)
+        ),
+    );
+    for warning in &report.warnings {
+        warning_ui(ui, warning);
+    }
+    for finding in &report.data_health {
+        warning_ui(ui, format!("{}: {} → {}", finding.column, finding.problem, finding.mend));
+    }
+    use_ui(context, fit, ui);
+}
+
+fn stop_text(stop: StopReason) -> &'static str {
+    match stop {
+        StopReason::Converged => "converged",
+        StopReason::MaxIterations => "stopped at the last iteration",
+        StopReason::Cancelled => "cancelled: the best so far",
+    }
+}
+
+fn parameters_ui(report: &FitReport, ui: &mut Ui) {
+    Grid::new("parameters").num_columns(3).striped(true).spacing([10.0, 4.0]).show(ui, |ui| {
+        hint_ui(ui, "parameter");
+        hint_ui(ui, "value");
+        hint_ui(ui, "95 % interval");
+        ui.end_row();
+        for (key, estimate) in &report.parameters {
+            let known = NAMES.iter().find(|(name, ..)| name == key);
+            let (name, unit) = known.map_or((*key, ""), |(_, name, unit)| (*name, *unit));
+            ui.vertical(|ui| {
+                ui.spacing_mut().item_spacing.y = 0.0;
+                ui.label(name).on_hover_text(*key);
+                ui.label(RichText::new(unit).small().weak());
+            });
+            ui.label(mono(shown(estimate.value, 4)));
+            let interval = estimate.ci95.map_or_else(
+                || "none".to_owned(),
+                |[low, high]| format!("{}\n{}", shown(low, 4), shown(high, 4)),
+            );
+            ui.label(mono(interval).small());
+            ui.end_row();
+        }
+    });
+}
+
+fn use_ui(context: &ViewContext<'_>, fit: &FitRun, ui: &mut Ui) {
+    section_ui(ui, "Use in the model", |_| {});
+    let usable = fit.curve().is_some();
+    let targets: &[(Target, &str)] = if context.session.robot().is_some() {
+        &[(Target::Left, "Left motor"), (Target::Right, "Right motor"), (Target::Both, "Both motors")]
+    } else {
+        &[(Target::Both, "Axis")]
+    };
+    ui.horizontal(|ui| {
+        for (target, name) in targets {
+            let button = ui.add_enabled(usable, egui::Button::new(*name));
+            let help = "Put the fitted curve into the model; the simulated robot gets it at once";
+            if button.on_hover_text(help).clicked() {
+                context.commands.send(Command::UseFit(*target));
+            }
+        }
+    });
+    if !usable {
+        hint_ui(ui, "This fit gave no complete Stribeck curve, so there is nothing to put into the model.");
+    }
+}

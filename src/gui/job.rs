@@ -1,0 +1,155 @@
+//! Background jobs: a handle with progress, cancel and a result, on a named thread.
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
+
+/// Wakes the window after a worker has put something in a channel.
+pub(crate) type Waker = Arc<dyn Fn() + Send + Sync>;
+
+/// Progress reports that wait for the window; more are dropped, since only the newest matters.
+const PROGRESS_CAPACITY: usize = 256;
+
+/// What a job reports through.
+pub(crate) struct Reporter<P> {
+    sender: SyncSender<P>,
+    cancel: Arc<AtomicBool>,
+    waker: Waker,
+}
+
+impl<P> Reporter<P> {
+    /// Hands progress to the window; `Break` when the job has been cancelled.
+    pub(crate) fn progress(&self, progress: P) -> ControlFlow<()> {
+        if self.cancel.load(Ordering::Relaxed) {
+            return ControlFlow::Break(());
+        }
+        if self.sender.try_send(progress).is_ok() {
+            (self.waker)();
+        }
+        ControlFlow::Continue(())
+    }
+}
+
+/// How a job ended.
+#[derive(Debug)]
+pub(crate) enum Outcome<R> {
+    /// Still at work.
+    Running,
+    /// Its result.
+    Done(R),
+    /// Its thread ended without one.
+    Broken,
+}
+
+/// A running job. Dropping it cancels the work and drops its result, so a result can never be taken for
+/// that of a later job. The thread isn't joined: the window must not wait for it.
+pub(crate) struct Job<P, R> {
+    progress: Receiver<P>,
+    result: Receiver<R>,
+    cancel: Arc<AtomicBool>,
+}
+
+impl<P: Send + 'static, R: Send + 'static> Job<P, R> {
+    /// Starts `work` on a thread called `name`.
+    pub(crate) fn start(
+        name: &str,
+        waker: &Waker,
+        work: impl FnOnce(&Reporter<P>) -> R + Send + 'static,
+    ) -> std::io::Result<Self> {
+        let (progress_sender, progress) = sync_channel(PROGRESS_CAPACITY);
+        let (result_sender, result) = sync_channel(1);
+        let cancel = Arc::new(AtomicBool::new(false));
+        let reporter =
+            Reporter { sender: progress_sender, cancel: Arc::clone(&cancel), waker: Arc::clone(waker) };
+        std::thread::Builder::new().name(name.to_owned()).spawn(move || {
+            let wake = WakeOnDrop(Arc::clone(&reporter.waker));
+            // An error means that the window no longer wants the result.
+            result_sender.send(work(&reporter)).ok();
+            drop(result_sender);
+            drop(wake);
+        })?;
+        Ok(Self { progress, result, cancel })
+    }
+
+    /// What has come since the last call, without waiting.
+    pub(crate) fn poll(&mut self) -> (Vec<P>, Outcome<R>) {
+        let outcome = match self.result.try_recv() {
+            Ok(result) => Outcome::Done(result),
+            Err(TryRecvError::Empty) => Outcome::Running,
+            Err(TryRecvError::Disconnected) => Outcome::Broken,
+        };
+        (self.progress.try_iter().collect(), outcome)
+    }
+
+    /// Asks the work to stop; its result says that it was stopped.
+    pub(crate) fn cancel(&self) {
+        self.cancel.store(true, Ordering::Relaxed);
+    }
+}
+
+impl<P, R> Drop for Job<P, R> {
+    fn drop(&mut self) {
+        self.cancel.store(true, Ordering::Relaxed);
+    }
+}
+
+/// Wakes the window even when the work panics, so that it can say so.
+struct WakeOnDrop(Waker);
+
+impl Drop for WakeOnDrop {
+    fn drop(&mut self) {
+        (self.0)();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn wait<P: Send + 'static, R: Send + 'static>(job: &mut Job<P, R>) -> (Vec<P>, Outcome<R>) {
+        let mut all = Vec::new();
+        loop {
+            let (progress, outcome) = job.poll();
+            all.extend(progress);
+            if !matches!(outcome, Outcome::Running) {
+                return (all, outcome);
+            }
+            std::thread::yield_now();
+        }
+    }
+
+    fn no_waker() -> Waker {
+        Arc::new(|| {})
+    }
+
+    #[test]
+    fn progress_comes_in_order_and_then_the_result() {
+        let mut job = Job::start("test", &no_waker(), |reporter: &Reporter<u32>| {
+            (0..5).all(|i| reporter.progress(i).is_continue())
+        })
+        .unwrap();
+        let (progress, outcome) = wait(&mut job);
+        assert_eq!(progress, [0, 1, 2, 3, 4]);
+        assert!(matches!(outcome, Outcome::Done(true)));
+    }
+
+    #[test]
+    fn a_cancelled_job_stops_by_itself() {
+        let mut job = Job::start("test", &no_waker(), |reporter: &Reporter<()>| {
+            while reporter.progress(()).is_continue() {
+                std::thread::yield_now();
+            }
+            "stopped"
+        })
+        .unwrap();
+        job.cancel();
+        assert!(matches!(wait(&mut job).1, Outcome::Done("stopped")));
+    }
+
+    #[test]
+    fn a_job_that_breaks_is_told_apart_from_one_that_runs() {
+        let mut job = Job::<(), ()>::start("test", &no_waker(), |_| panic!("expected in this test")).unwrap();
+        assert!(matches!(wait(&mut job).1, Outcome::Broken));
+    }
+}

@@ -1,0 +1,210 @@
+//! One plot of a stack, and the horizontal range that the stack shares.
+
+use egui::{Color32, Response, Ui, Vec2};
+use egui_plot::{Line, Plot, PlotPoints};
+
+use super::decimate::{Curve, DecimationCache, RangeStatistics, Visible};
+
+/// Width kept for the vertical axis, so that stacked plots line up.
+const AXIS_WIDTH: f32 = 52.0;
+/// The shortest range that can be zoomed to.
+const MIN_SPAN: f64 = 1e-3;
+
+/// The horizontal range of a stack of plots: it follows the newest sample until the user moves it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TimeView {
+    /// Whether the newest sample stays at the right edge.
+    pub follow: bool,
+    /// Length of the range.
+    pub span: f64,
+    end: f64,
+    limits: [f64; 2],
+}
+
+impl TimeView {
+    /// A view that follows, `span` long.
+    pub fn following(span: f64) -> Self {
+        Self { follow: true, span, end: span, limits: [0.0, span] }
+    }
+
+    /// Takes note of the data's range; call it once a frame, before the plots.
+    pub fn update(&mut self, data: [f64; 2]) {
+        self.limits = data;
+        if self.follow {
+            self.end = data[1].max(data[0] + self.span);
+        }
+    }
+
+    /// Shows all of the data and holds it.
+    pub fn show_all(&mut self, data: [f64; 2]) {
+        self.follow = false;
+        self.limits = data;
+        self.span = (data[1] - data[0]).max(MIN_SPAN);
+        self.end = data[0] + self.span;
+    }
+
+    /// The visible range.
+    pub fn range(&self) -> [f64; 2] {
+        [self.end - self.span, self.end]
+    }
+
+    /// Moves the range by `delta` and holds it.
+    fn pan(&mut self, delta: f64) {
+        self.follow = false;
+        let slack = 0.9 * self.span;
+        self.end = (self.end + delta).clamp(self.limits[0] + self.span - slack, self.limits[1] + slack);
+    }
+
+    /// Zooms by `factor` about `center`; while following, the right edge stays.
+    fn zoom(&mut self, factor: f64, center: f64) {
+        let longest = 1.2 * (self.limits[1] - self.limits[0]).max(1.0);
+        let span = (self.span / factor).clamp(MIN_SPAN, longest);
+        if !self.follow {
+            self.end = center + (self.end - center) * span / self.span;
+        }
+        self.span = span;
+    }
+}
+
+/// One plot of a stack.
+pub struct TimePlot<'a> {
+    /// Distinguishes it from other plots.
+    pub id: &'a str,
+    /// Label of the vertical axis, with the unit.
+    pub label: &'a str,
+    /// Colour of the line.
+    pub color: Color32,
+    /// Height in points.
+    pub height: f32,
+    /// Label of the horizontal axis; without one the axis is not drawn (the plot below has it).
+    pub x_label: Option<&'a str>,
+    /// The vertical range is at least this long.
+    pub min_y_span: f64,
+}
+
+impl TimePlot<'_> {
+    /// Draws the curve over the view's range, lets the user pan (drag), zoom (wheel) and resume following
+    /// (double click), and returns the statistics of what is visible.
+    pub fn show(
+        &self,
+        ui: &mut Ui,
+        view: &mut TimeView,
+        cache: &mut DecimationCache,
+        curve: Curve<'_>,
+        generation: u64,
+    ) -> Option<RangeStatistics> {
+        let columns = (ui.available_width() - AXIS_WIDTH).max(1.0) * ui.ctx().pixels_per_point();
+        let range = view.range();
+        let visible = cache.visible(curve, generation, range, columns as usize);
+        let response = self.draw(ui, visible, range);
+        interact(ui, &response.0, response.1, view);
+        visible.statistics
+    }
+
+    fn draw(&self, ui: &mut Ui, visible: &Visible, range: [f64; 2]) -> (Response, egui_plot::PlotTransform) {
+        let y_range = y_range(visible.statistics, self.min_y_span);
+        let mut plot = Plot::new(self.id)
+            .height(self.height.max(1.0))
+            .allow_drag(false)
+            .allow_zoom(false)
+            .allow_scroll(false)
+            .allow_boxed_zoom(false)
+            .allow_double_click_reset(false)
+            .allow_axis_zoom_drag(false)
+            .show_axes([self.x_label.is_some(), true])
+            .y_axis_label(self.label)
+            .y_axis_min_width(AXIS_WIDTH)
+            .y_axis_formatter(|mark, _| tick(mark.value, mark.step_size))
+            .label_formatter(|_| None);
+        if let Some(label) = self.x_label {
+            plot = plot.x_axis_label(label);
+        }
+        let shown = plot.show(ui, |plot_ui| {
+            plot_ui.set_plot_bounds_x(range[0]..=range[1]);
+            plot_ui.set_plot_bounds_y(y_range[0]..=y_range[1]);
+            for (number, piece) in visible.pieces.iter().enumerate() {
+                plot_ui.line(
+                    Line::new(self.id, PlotPoints::Borrowed(piece))
+                        .id((self.id, number))
+                        .color(self.color)
+                        .width(1.3)
+                        .allow_band(false)
+                        .allow_hover(false),
+                );
+            }
+        });
+        (shown.response, shown.transform)
+    }
+}
+
+/// A vertical range with a margin, never empty, centred on the data.
+fn y_range(statistics: Option<RangeStatistics>, min_span: f64) -> [f64; 2] {
+    let (low, high) = statistics.map_or((0.0, 0.0), |s| (s.min, s.max));
+    let center = 0.5 * low + 0.5 * high;
+    let half = (0.55 * (high - low)).max(0.5 * min_span).max(1e-6 * center.abs());
+    [center - half, center + half]
+}
+
+/// A tick with the decimals that its step needs.
+pub(crate) fn tick(value: f64, step: f64) -> String {
+    let decimals = (-step.abs().log10().floor()).clamp(0.0, 9.0) as usize;
+    let text = format!("{value:.decimals$}");
+    let zero = text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.');
+    if zero { text.trim_start_matches('-').to_owned() } else { text.replace('-', "−") }
+}
+
+fn interact(ui: &Ui, response: &Response, transform: egui_plot::PlotTransform, view: &mut TimeView) {
+    let per_point = view.span / f64::from(transform.frame().width().max(1.0));
+    if response.dragged() {
+        view.pan(-f64::from(response.drag_delta().x) * per_point);
+    }
+    if response.double_clicked() {
+        view.follow = true;
+    }
+    let Some(pointer) = response.hover_pos() else { return };
+    let (wheel, pinch) = ui.input(|input| (input.smooth_scroll_delta(), input.zoom_delta()));
+    let factor = f64::from(pinch) * (f64::from(wheel.y) / 200.0).exp();
+    if (factor - 1.0).abs() > 1e-9 {
+        view.zoom(factor, transform.value_from_position(pointer).x);
+    }
+    if wheel.x != 0.0 {
+        view.pan(-f64::from(wheel.x) * per_point);
+    }
+    debug_assert!(Vec2::from(wheel).is_finite(), "input is finite");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_following_view_keeps_the_newest_sample_at_its_right_edge() {
+        let mut view = TimeView::following(10.0);
+        view.update([0.0, 3.0]);
+        assert_eq!(view.range(), [0.0, 10.0], "the first seconds fill the plot from the left");
+        view.update([0.0, 42.0]);
+        assert_eq!(view.range(), [32.0, 42.0]);
+        view.pan(-5.0);
+        view.update([0.0, 50.0]);
+        assert_eq!(view.range(), [27.0, 37.0], "a moved view stays where it is");
+    }
+
+    #[test]
+    fn zoom_keeps_the_value_under_the_pointer() {
+        let mut view = TimeView::following(10.0);
+        view.show_all([0.0, 10.0]);
+        view.zoom(2.0, 4.0);
+        assert_eq!(view.range(), [2.0, 7.0]);
+        view.zoom(1e9, 4.0);
+        assert!(view.span >= MIN_SPAN);
+        view.zoom(1e-9, 4.0);
+        assert!(view.span <= 12.0);
+    }
+
+    #[test]
+    fn ticks_have_the_decimals_of_their_step() {
+        assert_eq!(tick(-0.15, 0.05), "−0.15");
+        assert_eq!(tick(-0.0, 0.1), "0.0");
+        assert_eq!(tick(20.0, 10.0), "20");
+    }
+}

@@ -1,0 +1,141 @@
+//! The *Tune* page: weights and gains at the left, the live robot in the middle, the model at the right.
+
+mod gains;
+mod live_plots;
+mod matrices;
+mod model;
+mod parameters;
+mod predicted;
+mod weights;
+
+use std::path::Path;
+
+use egui::{CentralPanel, Frame, Margin, Panel, ScrollArea, Ui};
+
+use crate::command::{Command, FilePurpose, Source};
+use crate::context::ViewContext;
+use crate::session::Session;
+use crate::widgets::hint_ui;
+use live_plots::LivePlots;
+use model::ModelFiles;
+use parameters::ParameterEditor;
+use predicted::Predicted;
+use weights::WeightEditor;
+
+pub(crate) use model::PRESETS;
+
+/// State of the page that is no part of the session.
+pub(crate) struct TuneTab {
+    weights: WeightEditor,
+    plots: LivePlots,
+    predicted: Predicted,
+    files: ModelFiles,
+    parameters: ParameterEditor,
+}
+
+impl TuneTab {
+    pub(crate) fn new(session: &Session, path: Option<&Path>) -> Self {
+        Self {
+            weights: WeightEditor::default(),
+            plots: LivePlots::new(),
+            predicted: Predicted::default(),
+            files: ModelFiles::new(path),
+            parameters: ParameterEditor::new(session),
+        }
+    }
+
+    /// Another model was loaded.
+    pub(crate) fn load(&mut self, session: &Session, path: Option<&Path>) {
+        self.files = ModelFiles::new(path);
+        self.refresh(session);
+    }
+
+    /// The session was changed from elsewhere.
+    pub(crate) fn refresh(&mut self, session: &Session) {
+        self.parameters = ParameterEditor::new(session);
+    }
+
+    pub(crate) fn reset_view(&mut self) {
+        self.plots.reset_view();
+    }
+
+    pub(crate) fn focus_weights(&mut self) {
+        self.weights.focus_first = true;
+    }
+
+    pub(crate) fn note_dialog_problem(&mut self, purpose: FilePurpose, problem: &str) {
+        if purpose != FilePurpose::OpenLog {
+            self.note_file_problem(problem);
+        }
+    }
+
+    pub(crate) fn note_file_problem(&mut self, problem: &str) {
+        self.files.problem = Some(problem.to_owned());
+    }
+
+    pub(crate) fn note_saved(&mut self, path: &Path) {
+        self.files = ModelFiles::new(Some(path));
+    }
+
+    pub(crate) fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
+        let side = Frame::side_top_panel(ui.style()).inner_margin(Margin::symmetric(10, 6));
+        Panel::right("model").frame(side).resizable(true).default_size(252.0).size_range(220.0..=420.0).show(
+            ui,
+            |ui| {
+                ScrollArea::vertical().show(ui, |ui| {
+                    self.files.ui(context, ui);
+                    self.parameters.ui(context, ui);
+                });
+            },
+        );
+        if context.session.robot().is_none() {
+            no_robot_ui(context, ui);
+            return;
+        }
+        Panel::left("weights").frame(side).resizable(true).default_size(338.0).size_range(300.0..=460.0).show(
+            ui,
+            |ui| {
+                ScrollArea::vertical().show(ui, |ui| {
+                    self.weights.ui(context, ui);
+                    gains::ui(context, ui);
+                    gains::feedforward_ui(context, ui);
+                });
+            },
+        );
+        let bottom = Frame::central_panel(ui.style()).inner_margin(Margin::symmetric(10, 6));
+        Panel::bottom("predicted").frame(bottom).resizable(true).default_size(206.0).size_range(120.0..=420.0).show(
+            ui,
+            |ui| self.predicted.ui(context, ui),
+        );
+        CentralPanel::default().frame(bottom).show(ui, |ui| match context.source {
+            Source::Simulated => self.plots.ui(context, ui),
+            Source::Can => not_connected_ui(context, ui),
+        });
+    }
+}
+
+fn no_robot_ui(context: &ViewContext<'_>, ui: &mut Ui) {
+    CentralPanel::default().show(ui, |ui| {
+        ui.add_space(60.0);
+        ui.vertical_centered(|ui| {
+            ui.heading("This model is a single axis: there is nothing to balance");
+            hint_ui(ui, "Fit its friction on the friction tab, or load the model of a robot.");
+            if ui.button("Load the paper's robot").clicked() {
+                context.commands.send(Command::LoadPreset(0));
+            }
+        });
+    });
+}
+
+fn not_connected_ui(context: &ViewContext<'_>, ui: &mut Ui) {
+    ui.add_space(80.0);
+    ui.vertical_centered(|ui| {
+        ui.heading("CAN: not connected");
+        hint_ui(ui, "This version has no CAN link yet, so there is nothing measured to show here.");
+        hint_ui(ui, "The simulated robot is paused and is not shown as if it were the real one.");
+        ui.add_space(8.0);
+        if ui.button("Back to the simulated robot").clicked() {
+            context.commands.send(Command::SelectSource(Source::Simulated));
+        }
+    });
+}

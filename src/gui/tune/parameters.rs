@@ -1,0 +1,176 @@
+//! Parameters of the model. A field keeps what was typed; only what the core accepts reaches the session.
+
+use egui::{CollapsingHeader, Grid, Ui};
+use flqr_core::ParameterError;
+use flqr_core::friction::{Stribeck, StribeckParameters};
+use flqr_core::robot::RobotParameters;
+
+use crate::command::Command;
+use crate::context::ViewContext;
+use crate::session::Session;
+use crate::widgets::{error_ui, hint_ui, number_ui, section_ui};
+
+/// What a curve begins with when a motor without friction gets one: the left motor of the paper's table 4.
+const FIRST_CURVE: StribeckParameters = StribeckParameters {
+    coulomb_nm: 0.0338,
+    static_nm: 0.0761,
+    viscous_nm_s_rad: 4.9e-4,
+    stribeck_speed_rad_s: 1.612,
+    stribeck_exponent: 0.231,
+    offset_nm: -0.0016,
+};
+
+const FIRST_LIMIT_NM: f64 = 2.42;
+
+/// What has been typed.
+pub(super) struct ParameterEditor {
+    robot: Option<RobotParameters>,
+    friction: [Option<StribeckParameters>; 2],
+    torque_limit_nm: Option<f64>,
+}
+
+type Field<T> = (&'static str, &'static str, &'static str, &'static str, fn(&mut T) -> &mut f64);
+
+/// Key in the model file, name, unit, help, and where the value is.
+const ROBOT_FIELDS: [Field<RobotParameters>; 7] = [
+    ("body_mass_kg", "body mass", "kg", "Everything above the axle", |p| &mut p.body_mass_kg),
+    ("wheel_mass_kg", "wheel mass", "kg", "One wheel", |p| &mut p.wheel_mass_kg),
+    ("wheel_inertia_kg_m2", "wheel inertia", "kg m²", "One wheel and its rotor about the axle", |p| {
+        &mut p.wheel_inertia_kg_m2
+    }),
+    ("wheel_radius_m", "wheel radius", "m", "Axle to ground", |p| &mut p.wheel_radius_m),
+    ("com_height_m", "centre of mass", "m", "Axle to the body's centre of mass", |p| &mut p.com_height_m),
+    ("body_inertia_kg_m2", "body inertia", "kg m²", "About the body's centre of mass", |p| {
+        &mut p.body_inertia_kg_m2
+    }),
+    ("gravity_m_s2", "gravity", "m/s²", "Acceleration of free fall", |p| &mut p.gravity_m_s2),
+];
+
+const FRICTION_FIELDS: [Field<StribeckParameters>; 6] = [
+    ("coulomb_nm", "Coulomb", "N m", "Level of sliding friction", |p| &mut p.coulomb_nm),
+    ("static_nm", "static", "N m", "Level at which the resting shaft breaks away", |p| &mut p.static_nm),
+    ("viscous_nm_s_rad", "viscous", "N m s/rad", "Grows with the speed", |p| &mut p.viscous_nm_s_rad),
+    ("stribeck_speed_rad_s", "Stribeck speed", "rad/s", "Speed over which static friction fades", |p| {
+        &mut p.stribeck_speed_rad_s
+    }),
+    ("stribeck_exponent", "exponent", "", "Shape of that fading", |p| &mut p.stribeck_exponent),
+    ("offset_nm", "offset", "N m", "Constant offset", |p| &mut p.offset_nm),
+];
+
+impl ParameterEditor {
+    pub(super) fn new(session: &Session) -> Self {
+        let curve = |motor| session.friction(motor).map(|curve| *curve.parameters());
+        Self {
+            robot: session.robot().map(|robot| robot.parameters),
+            friction: [curve(0), curve(1)],
+            torque_limit_nm: session.robot().and_then(|robot| robot.torque_limit_nm),
+        }
+    }
+
+    pub(super) fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
+        if self.robot.is_none() {
+            return;
+        }
+        section_ui(ui, "Robot", |_| {});
+        self.robot_ui(context, ui);
+        self.limit_ui(context, ui);
+        ui.add_space(4.0);
+        CollapsingHeader::new("Friction of the motors").default_open(true).show(ui, |ui| {
+            self.friction_ui(context, ui);
+        });
+    }
+
+    fn robot_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
+        let Some(robot) = &mut self.robot else { return };
+        let before = *robot;
+        let refused = robot.validate().err();
+        Grid::new("robot").num_columns(3).spacing([8.0, 3.0]).show(ui, |ui| {
+            for (key, name, unit, help, value) in ROBOT_FIELDS {
+                ui.label(name).on_hover_text(help);
+                number_ui(ui, value(robot), name, 64.0).on_hover_text(help);
+                ui.label(unit);
+                ui.end_row();
+                problem_row_ui(ui, refused.as_ref(), key);
+            }
+        });
+        if *robot != before && robot.validate().is_ok() {
+            context.commands.send(Command::SetParameters(*robot));
+        }
+    }
+
+    fn limit_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
+        let before = self.torque_limit_nm;
+        ui.horizontal(|ui| {
+            let mut limited = self.torque_limit_nm.is_some();
+            let help = "Largest torque of one motor; without it the simulated motors are unlimited";
+            if ui.checkbox(&mut limited, "torque limit").on_hover_text(help).changed() {
+                self.torque_limit_nm = limited.then_some(FIRST_LIMIT_NM);
+            }
+            if let Some(limit) = &mut self.torque_limit_nm {
+                number_ui(ui, limit, "torque limit value", 64.0);
+                ui.label("N m");
+            }
+        });
+        let valid = self.torque_limit_nm.is_none_or(|limit| limit > 0.0);
+        if !valid {
+            error_ui(ui, "the torque limit must be above 0; the last good one stays in force");
+        } else if self.torque_limit_nm != before {
+            context.commands.send(Command::SetTorqueLimit(self.torque_limit_nm));
+        }
+    }
+
+    fn friction_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
+        let before = self.friction;
+        Grid::new("friction").num_columns(3).spacing([6.0, 3.0]).show(ui, |ui| {
+            ui.label("");
+            for (motor, name) in ["left", "right"].into_iter().enumerate() {
+                let mut present = self.friction[motor].is_some();
+                let help = format!("Whether the {name} motor has friction");
+                if ui.checkbox(&mut present, name).on_hover_text(help).changed() {
+                    self.friction[motor] = present.then_some(FIRST_CURVE);
+                }
+            }
+            ui.end_row();
+            for (_, name, unit, help, value) in FRICTION_FIELDS {
+                ui.label(name).on_hover_text(format!("{help} [{unit}]"));
+                for (motor, side) in ["left", "right"].into_iter().enumerate() {
+                    match &mut self.friction[motor] {
+                        Some(curve) => {
+                            let accessible = format!("{name} friction {side}");
+                            number_ui(ui, value(curve), &accessible, 54.0)
+                                .on_hover_text(format!("{help}, {side} motor [{unit}]"));
+                        }
+                        None => {
+                            ui.weak("–");
+                        }
+                    }
+                }
+                ui.end_row();
+            }
+        });
+        hint_ui(ui, "N m, rad/s and N m s/rad");
+        self.send_friction(context, ui, before);
+    }
+
+    fn send_friction(&self, context: &ViewContext<'_>, ui: &mut Ui, before: [Option<StribeckParameters>; 2]) {
+        let curves = self.friction.map(|parameters| parameters.map(Stribeck::new));
+        for (curve, side) in curves.iter().zip(["left", "right"]) {
+            if let Some(Err(problem)) = curve {
+                error_ui(ui, format!("{side} motor: {problem}; the last good curve stays in force"));
+            }
+        }
+        let good = curves.iter().all(|curve| !matches!(curve, Some(Err(_))));
+        if good && self.friction != before {
+            context.commands.send(Command::SetFriction(curves.map(|curve| curve.and_then(Result::ok))));
+        }
+    }
+}
+
+/// The refusal, below the field that caused it.
+fn problem_row_ui(ui: &mut Ui, refused: Option<&ParameterError>, key: &str) {
+    let Some(problem) = refused.filter(|problem| problem.name == key) else { return };
+    ui.label("");
+    error_ui(ui, format!("must be {}", problem.allowed))
+        .on_hover_text(format!("{problem}; the last good value stays in force"));
+    ui.end_row();
+}

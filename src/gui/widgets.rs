@@ -1,0 +1,129 @@
+//! Small pieces that every tab uses: section heads, messages, number fields, number text.
+
+use egui::{DragValue, Response, RichText, Ui, WidgetText};
+
+use crate::theme::palette;
+
+/// Head of a section, with room for controls at its right.
+pub(crate) fn section_ui(ui: &mut Ui, title: &str, controls: impl FnOnce(&mut Ui)) {
+    ui.add_space(4.0);
+    ui.horizontal(|ui| {
+        ui.label(RichText::new(title).heading().strong());
+        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), controls);
+    });
+}
+
+/// A quiet explanation.
+pub(crate) fn hint_ui(ui: &mut Ui, text: impl Into<String>) -> Response {
+    ui.add(egui::Label::new(RichText::new(text).small().weak()).wrap())
+}
+
+/// A mistake, in the place where it was made.
+pub(crate) fn error_ui(ui: &mut Ui, text: impl Into<String>) -> Response {
+    let color = palette(ui.visuals()).error;
+    ui.add(egui::Label::new(RichText::new(text).small().color(color)).wrap())
+}
+
+/// Something to know before trusting a result.
+pub(crate) fn warning_ui(ui: &mut Ui, text: impl Into<String>) -> Response {
+    let color = palette(ui.visuals()).warning;
+    ui.add(egui::Label::new(RichText::new(text).small().color(color)).wrap())
+}
+
+/// A number field that holds any magnitude: a drag changes it in proportion, typing sets it.
+pub(crate) fn number_ui(ui: &mut Ui, value: &mut f64, name: &str, width: f32) -> Response {
+    let speed = (0.01 * value.abs()).max(1e-6);
+    let field = DragValue::new(value)
+        .speed(speed)
+        .update_while_editing(false)
+        .min_size(egui::vec2(width, 0.0))
+        .custom_formatter(|value, _| plain(value, 4))
+        .custom_parser(parse);
+    ui.add(field).accessible_name(name)
+}
+
+/// Reads a number as people type it: surrounding spaces, a typographic minus, a decimal comma.
+pub(crate) fn parse(text: &str) -> Option<f64> {
+    let text = text.trim().replace('−', "-");
+    let text = if text.contains('.') { text } else { text.replacen(',', ".", 1) };
+    text.parse().ok().filter(|value: &f64| value.is_finite())
+}
+
+/// A number with `digits` significant digits, with an exponent only where needed; for fields.
+pub(crate) fn plain(value: f64, digits: usize) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return format!("{value}");
+    }
+    let exponent = value.abs().log10().floor() as i32;
+    if !(-4..7).contains(&exponent) {
+        let text = format!("{value:.*e}", digits.saturating_sub(1));
+        let (mantissa, power) = text.split_once('e').unwrap_or((&text, "0"));
+        return format!("{}e{power}", trimmed(mantissa));
+    }
+    let decimals = (digits as i32 - 1 - exponent).max(0) as usize;
+    trimmed(&format!("{value:.decimals$}")).to_owned()
+}
+
+fn trimmed(text: &str) -> &str {
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { text }
+}
+
+/// A number for reading: `digits` significant digits, fixed length, a typographic minus.
+pub(crate) fn shown(value: f64, digits: usize) -> String {
+    if value.is_nan() {
+        return "–".to_owned();
+    }
+    let size = value.abs();
+    if size != 0.0 && (!(1e-4..1e6).contains(&size)) {
+        return format!("{value:.*e}", digits.saturating_sub(1)).replace('-', "−");
+    }
+    let exponent = if size == 0.0 { 0 } else { size.log10().floor() as i32 };
+    let decimals = (digits as i32 - 1 - exponent).max(0) as usize;
+    format!("{value:.decimals$}").replace('-', "−")
+}
+
+/// Monospace text, for columns of numbers.
+pub(crate) fn mono(text: impl Into<String>) -> RichText {
+    RichText::new(text).monospace()
+}
+
+/// A row of choices of which one holds; says whether it was changed.
+pub(crate) fn choice_ui<T: PartialEq + Copy>(
+    ui: &mut Ui,
+    value: &mut T,
+    choices: &[(T, &str, &str)],
+) -> bool {
+    let mut changed = false;
+    ui.spacing_mut().item_spacing.x = 2.0;
+    for (choice, name, help) in choices {
+        let text: WidgetText = (*name).into();
+        changed |= ui.selectable_value(value, *choice, text).on_hover_text(*help).changed();
+    }
+    changed
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_keep_their_digits_and_lose_their_zeros() {
+        for (value, text) in
+            [(60.0, "60"), (0.00049, "0.00049"), (1.5e-7, "1.5e-7"), (123456.0, "123456"), (-0.25, "-0.25")]
+        {
+            assert_eq!(plain(value, 4), text);
+        }
+        assert_eq!(shown(-12.3456, 4), "−12.35");
+        assert_eq!(shown(0.0, 3), "0.00");
+        assert_eq!(shown(2.1e-15, 2), "2.1e−15");
+    }
+
+    #[test]
+    fn typed_numbers_may_have_a_comma_or_a_real_minus() {
+        assert_eq!(parse(" −0,5 "), Some(-0.5));
+        assert_eq!(parse("1.5e-3"), Some(1.5e-3));
+        for refused in ["", "abc", "nan", "inf", "1.0,5"] {
+            assert_eq!(parse(refused), None, "{refused}");
+        }
+    }
+}

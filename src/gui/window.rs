@@ -1,0 +1,180 @@
+//! Opening the window, and one clear sentence when that cannot be done.
+
+use std::path::PathBuf;
+
+use flqr_core::model_file::Model;
+
+use crate::app::{App, Tab};
+
+/// How the window starts.
+#[derive(Clone, Debug)]
+pub struct WindowOptions {
+    /// The model to begin with.
+    pub model: Model,
+    /// Where the model came from; "Save" goes there.
+    pub model_path: Option<PathBuf>,
+    /// A log to load at once.
+    pub log: Option<PathBuf>,
+    /// Column map for logs, entries `ours=theirs*factor` separated by spaces.
+    pub column_map: String,
+    /// The tab to begin with.
+    pub tab: Tab,
+    /// Whether the simulated robot starts paused.
+    pub paused: bool,
+    /// A file that always holds what the window shows, as JSON.
+    pub state_out: Option<PathBuf>,
+}
+
+impl WindowOptions {
+    /// A window on `model` with everything else as usual.
+    pub fn new(model: Model) -> Self {
+        Self {
+            model,
+            model_path: None,
+            log: None,
+            column_map: String::new(),
+            tab: Tab::Tune,
+            paused: false,
+            state_out: None,
+        }
+    }
+}
+
+/// Why there is no window.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum WindowError {
+    /// No display, or one without OpenGL.
+    NoDisplay {
+        /// What the system said.
+        reason: String,
+    },
+    /// A library of the window system is missing.
+    MissingLibrary {
+        /// What the system said.
+        reason: String,
+    },
+}
+
+impl std::fmt::Display for WindowError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::NoDisplay { reason } => write!(
+                f,
+                "the window needs a display with OpenGL and there is none here ({reason}); without one, use `flqr gains`, `flqr fit`, `flqr simulate`, `flqr riccati` or `flqr export`"
+            ),
+            Self::MissingLibrary { reason } => write!(
+                f,
+                "the window could not be opened because a library is missing ({reason}); on Debian or Ubuntu install {PACKAGES}, or use `flqr gains`, `flqr fit`, `flqr simulate`, `flqr riccati` or `flqr export`, which need none"
+            ),
+        }
+    }
+}
+
+impl std::error::Error for WindowError {}
+
+/// What a bare Debian 12 needs at run time.
+const PACKAGES: &str = "libx11-6 libx11-xcb1 libxcursor1 libxi6 libxkbcommon-x11-0 libgl1";
+
+const ICON: &[u8] = include_bytes!("../../assets/icon.png");
+
+/// Opens the window and returns when it is closed.
+///
+/// # Errors
+/// No display, no OpenGL, or a missing library of the window system.
+pub fn run(options: WindowOptions) -> Result<(), WindowError> {
+    check_display()?;
+    // The window library panics, instead of returning an error, where a library is missing.
+    let quiet = std::panic::take_hook();
+    let opening = std::sync::Arc::new(std::sync::atomic::AtomicBool::new(true));
+    install_hook(quiet, &opening);
+    let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| open(options, &opening)));
+    match result {
+        Ok(Ok(())) => Ok(()),
+        Ok(Err(error)) => Err(WindowError::NoDisplay { reason: one_line(&error.to_string()) }),
+        Err(payload) if opening.load(std::sync::atomic::Ordering::Relaxed) => {
+            Err(WindowError::MissingLibrary { reason: one_line(panic_text(&*payload)) })
+        }
+        Err(payload) => std::panic::resume_unwind(payload),
+    }
+}
+
+type Hook = Box<dyn Fn(&std::panic::PanicHookInfo<'_>) + Send + Sync>;
+
+/// Panics while the window opens become an error; later ones are reported as usual.
+fn install_hook(usual: Hook, opening: &std::sync::Arc<std::sync::atomic::AtomicBool>) {
+    let opening = std::sync::Arc::clone(opening);
+    std::panic::set_hook(Box::new(move |info| {
+        if !opening.load(std::sync::atomic::Ordering::Relaxed) {
+            usual(info);
+        }
+    }));
+}
+
+fn open(options: WindowOptions, opening: &std::sync::atomic::AtomicBool) -> eframe::Result {
+    let mut viewport = egui::ViewportBuilder::default()
+        .with_title("flqr")
+        .with_app_id("flqr")
+        .with_inner_size([1280.0, 800.0])
+        .with_min_inner_size([640.0, 420.0])
+        .with_drag_and_drop(true);
+    if let Ok(icon) = eframe::icon_data::from_png_bytes(ICON) {
+        viewport = viewport.with_icon(icon);
+    }
+    let native = eframe::NativeOptions {
+        viewport,
+        centered: true,
+        persist_window: false,
+        system_font_fallback: false,
+        dithering: false,
+        ..eframe::NativeOptions::default()
+    };
+    eframe::run_native(
+        "flqr",
+        native,
+        Box::new(|creation| {
+            opening.store(false, std::sync::atomic::Ordering::Relaxed);
+            Ok(Box::new(App::new(options, &creation.egui_ctx)?))
+        }),
+    )
+}
+
+#[cfg(all(unix, not(target_os = "macos")))]
+fn check_display() -> Result<(), WindowError> {
+    let set = |name: &str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
+    if set("DISPLAY") || set("WAYLAND_DISPLAY") || set("WAYLAND_SOCKET") {
+        return Ok(());
+    }
+    Err(WindowError::NoDisplay { reason: "neither DISPLAY nor WAYLAND_DISPLAY is set".to_owned() })
+}
+
+#[cfg(not(all(unix, not(target_os = "macos"))))]
+fn check_display() -> Result<(), WindowError> {
+    Ok(())
+}
+
+fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+fn panic_text(payload: &(dyn std::any::Any + Send)) -> &str {
+    payload
+        .downcast_ref::<String>()
+        .map(String::as_str)
+        .or_else(|| payload.downcast_ref::<&str>().copied())
+        .unwrap_or("no reason given")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_names_the_commands_that_work_and_the_packages() {
+        let no_display = WindowError::NoDisplay { reason: "DISPLAY is not set".to_owned() }.to_string();
+        for command in ["gains", "fit", "simulate", "riccati", "export"] {
+            assert!(no_display.contains(&format!("flqr {command}")), "{no_display}");
+        }
+        let library = WindowError::MissingLibrary { reason: "libxkbcommon-x11".to_owned() }.to_string();
+        assert!(library.contains("libxkbcommon-x11-0 libgl1"));
+    }
+}
