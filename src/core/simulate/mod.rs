@@ -3,6 +3,7 @@
 mod near_angle;
 mod noise;
 mod plant;
+mod response;
 mod sample;
 mod sensors;
 mod simulation;
@@ -10,6 +11,7 @@ mod sliding;
 mod statistics;
 
 pub use plant::{Forcing, Plant};
+pub use response::predicted_response;
 pub use sample::Sample;
 pub use sensors::SensorSettings;
 pub use simulation::{FALL_PITCH_RAD, Fall, Simulation, SimulationError, SimulationSettings, TICK_S};
