@@ -10,19 +10,15 @@ use std::time::{Duration, Instant};
 use flqr_core::control::BalanceController;
 use flqr_core::model_file::RobotModel;
 use flqr_core::robot::State;
-use flqr_core::simulate::{Sample, Simulation, SimulationSettings};
+use flqr_core::simulate::{Sample, Simulation, SimulationSettings, TICK_S};
 
 use crate::job::Waker;
 
-/// Steps a second.
-const STEPS_PER_S: f64 = 1000.0;
 /// The robot never tries to catch up on more than this; the rest is counted as late.
-const CATCH_UP_STEPS: u64 = 250;
+const CATCH_UP_STEPS: u64 = 400;
 /// Batches that wait for the window, 2 s at 30 Hz.
 const BATCH_CAPACITY: usize = 64;
 const COMMAND_CAPACITY: usize = 64;
-/// Beyond this pitch the robot lies on the ground, rad.
-const FALLEN_PITCH_RAD: f64 = 0.8;
 
 /// What the window asks of the running robot.
 #[derive(Clone, Debug)]
@@ -153,7 +149,7 @@ impl Clock {
 
     /// Steps to make now, and steps to give up.
     fn due(&mut self, now: Instant) -> (u64, u64) {
-        let total = (now.duration_since(self.anchor).as_secs_f64() * STEPS_PER_S) as u64;
+        let total = (now.duration_since(self.anchor).as_secs_f64() / TICK_S) as u64;
         let behind = total.saturating_sub(self.done);
         let late = behind.saturating_sub(CATCH_UP_STEPS);
         self.done = total;
@@ -284,13 +280,12 @@ impl Worker {
 
     fn advance(&mut self) {
         let (steps, late) = self.clock.due(Instant::now());
-        self.late_s += late as f64 / STEPS_PER_S;
+        self.late_s += late as f64 * TICK_S;
         let Some(plant) = &mut self.plant else { return };
         for _ in 0..steps {
             let sample = plant.simulation.step();
-            let fallen = !(sample.pitch_rad.abs() < FALLEN_PITCH_RAD);
             self.pending.push(Sample { time_s: sample.time_s + plant.start_s, ..sample });
-            if fallen {
+            if plant.simulation.fall().is_some() {
                 self.fell = true;
                 return;
             }
@@ -327,7 +322,7 @@ mod tests {
         let start = clock.anchor;
         assert_eq!(clock.due(start + Duration::from_millis(40)), (40, 0));
         assert_eq!(clock.due(start + Duration::from_millis(40)), (0, 0));
-        assert_eq!(clock.due(start + Duration::from_millis(1040)), (CATCH_UP_STEPS, 750));
-        assert_eq!(clock.due(start + Duration::from_millis(1050)), (10, 0));
+        assert_eq!(clock.due(start + Duration::from_millis(1440)), (CATCH_UP_STEPS, 1000));
+        assert_eq!(clock.due(start + Duration::from_millis(1450)), (10, 0));
     }
 }

@@ -1,7 +1,7 @@
 //! The session document: all that a model file keeps and that undo would restore.
 
-use flqr_core::control::{BalanceController, ControllerKind};
-use flqr_core::friction::{Compensation, Feedforward, Stribeck};
+use flqr_core::control::{BalanceController, ControllerKind, DEFAULT_COMPENSATION};
+use flqr_core::friction::{Compensation, Stribeck};
 use flqr_core::lqr::Weights;
 use flqr_core::model_file::{AxisModel, Model, Rig, RobotModel};
 use nalgebra::Matrix2x4;
@@ -10,10 +10,6 @@ use nalgebra::Matrix2x4;
 pub(crate) fn default_weights() -> Weights {
     Weights::diagonal([60.0, 30.0, 100.0, 5.0], [20.0, 20.0])
 }
-
-/// Compensation of a robot whose file has none.
-pub(crate) const DEFAULT_COMPENSATION: Compensation =
-    Compensation { ratio: 0.95, smoothing_speed_rad_s: 0.02 };
 
 /// What the user edits.
 #[derive(Clone, Debug, PartialEq)]
@@ -79,44 +75,20 @@ impl Session {
         }
     }
 
-    /// The controller that these settings and a gain make; none without a robot.
+    /// The controller that these settings and a gain make; none without a robot. FLQR without any friction
+    /// is LQR, as [`Session::feedforward_problem`] says.
     pub(crate) fn balance_controller(&self, gain: Matrix2x4<f64>) -> Option<BalanceController> {
         let robot = self.robot()?;
-        Some(BalanceController {
-            gain,
-            feedforward: match self.controller {
-                ControllerKind::Lqr => None,
-                ControllerKind::Flqr => self.feedforward(robot),
-            },
-            torque_limit_nm: robot.torque_limit_nm.unwrap_or(f64::INFINITY),
-        })
+        BalanceController::new(self.controller, robot, gain)
+            .or_else(|_| BalanceController::new(ControllerKind::Lqr, robot, gain))
+            .ok()
     }
 
     /// Why FLQR would do nothing more than LQR, if it would.
     pub(crate) fn feedforward_problem(&self) -> Option<&'static str> {
         let robot = self.robot()?;
         robot.friction.iter().all(Option::is_none).then_some(
-            "The model has no friction: FLQR equals LQR. Fit a log on the friction tab, or enter the curve under “Friction of the motors”.",
+            "The model has no friction, so FLQR equals LQR: fit a log on the friction tab, or tick a motor under “Friction of the motors”.",
         )
     }
-
-    fn feedforward(&self, robot: &RobotModel) -> Option<[Feedforward; 2]> {
-        let of_motor = |curve: Option<Stribeck>| {
-            Feedforward::new(curve.unwrap_or_else(frictionless), self.compensation()).ok()
-        };
-        Some([of_motor(robot.friction[0])?, of_motor(robot.friction[1])?])
-    }
-}
-
-/// A curve that is zero everywhere, for a motor without friction beside one that has some.
-fn frictionless() -> Stribeck {
-    Stribeck::new(flqr_core::friction::StribeckParameters {
-        coulomb_nm: 0.0,
-        static_nm: 0.0,
-        viscous_nm_s_rad: 0.0,
-        stribeck_speed_rad_s: 1.0,
-        stribeck_exponent: 1.0,
-        offset_nm: 0.0,
-    })
-    .expect("zero levels with a positive speed and exponent are allowed")
 }

@@ -35,11 +35,7 @@ const DARK: Palette = Palette {
 const LIGHT: Palette = Palette {
     accent: Color32::from_rgb(18, 96, 200),
     reference: Color32::from_rgb(130, 136, 148),
-    channels: [
-        Color32::from_rgb(18, 96, 200),
-        Color32::from_rgb(14, 128, 84),
-        Color32::from_rgb(186, 98, 8),
-    ],
+    channels: [Color32::from_rgb(18, 96, 200), Color32::from_rgb(14, 128, 84), Color32::from_rgb(186, 98, 8)],
     measured: Color32::from_rgb(96, 104, 118),
     good: Color32::from_rgb(14, 128, 84),
     warning: Color32::from_rgb(164, 92, 0),

@@ -16,7 +16,7 @@ use crate::tune::PRESETS;
 /// A model file larger than this is none.
 const LARGEST_MODEL_BYTES: u64 = 1 << 20;
 /// Time between batches of the running robot while its plots are not shown.
-const HIDDEN_INTERVAL: std::time::Duration = std::time::Duration::from_millis(500);
+const HIDDEN_INTERVAL: std::time::Duration = std::time::Duration::from_millis(200);
 
 /// What to do with a chosen file.
 pub(super) fn chosen(purpose: FilePurpose, path: PathBuf) -> Command {
@@ -144,7 +144,8 @@ impl App {
             return;
         }
         let name = self.model_path.as_deref().and_then(Path::file_name);
-        let suggestion = name.map_or_else(|| "model.toml".to_owned(), |name| name.to_string_lossy().into_owned());
+        let suggestion =
+            name.map_or_else(|| "model.toml".to_owned(), |name| name.to_string_lossy().into_owned());
         match Dialog::open(purpose, suggestion, &self.waker) {
             Ok(dialog) => self.dialog = Some(dialog),
             Err(error) => self.fail(format!("No thread for a file dialog: {error}.")),
@@ -187,8 +188,9 @@ impl App {
         let path = if path.extension().is_none() { path.with_extension("toml") } else { path };
         let (file, text) = (path.clone(), self.session.model().to_toml());
         let write = move |_: &crate::job::Reporter<()>| {
-            crate::recent::write_file(&file, &text)
-                .map_err(|error| format!("{} could not be saved: {error}; nothing was changed", file.display()))
+            crate::recent::write_file(&file, &text).map_err(|error| {
+                format!("{} could not be saved: {error}; nothing was changed", file.display())
+            })
         };
         match Job::start("save-model", &self.waker, write) {
             Ok(job) => self.model_job = Some(ModelJob::Save(path, self.session.clone(), job)),
@@ -285,9 +287,8 @@ impl App {
 }
 
 fn read_model(path: &Path) -> Result<Model, String> {
-    let problem = |error: std::io::Error| {
-        format!("{} could not be opened: {error}; check the path", path.display())
-    };
+    let problem =
+        |error: std::io::Error| format!("{} could not be opened: {error}; check the path", path.display());
     let size = std::fs::metadata(path).map_err(problem)?.len();
     if size > LARGEST_MODEL_BYTES {
         return Err(format!(

@@ -20,6 +20,7 @@ const HELP: &[(&str, &str)] = &[
     ("Ctrl+L", "go to the path of the log"),
     ("Ctrl+Enter", "start or cancel the fit"),
     ("Ctrl+P", "pause or run the simulated robot"),
+    ("Ctrl+D", "light or dark"),
     ("Tab, Shift+Tab", "next, previous control"),
     ("drag, wheel, double click", "move, zoom, follow again (plots)"),
 ];
@@ -59,6 +60,9 @@ impl App {
         }
         if pressed(Key::Enter) && self.tab == Tab::Friction {
             send(if self.friction.fit_is_running() { Command::CancelFit } else { Command::StartFit });
+        }
+        if pressed(Key::D) {
+            switch_theme(ui);
         }
         if pressed(Key::E) {
             send(Command::SelectTab(Tab::Tune));
@@ -138,11 +142,12 @@ impl App {
     fn numbers_ui(&self, ui: &mut Ui) {
         if let Some(cpu) = self.frame_cpu_s {
             ui.label(RichText::new(format!("frame {:4.1} ms", 1e3 * cpu)).small().monospace().weak())
-                .on_hover_text("Processor time that the last frame took, without the graphics driver");
+                .on_hover_text("Time that the last frame took, drawing by the graphics driver included");
+            ui.separator();
         }
         let live = &self.live.status;
         let state = match self.source {
-            Source::Can => "CAN: not connected",
+            Source::Can => "CAN: no link",
             Source::Simulated if self.session.robot().is_none() => "no robot",
             Source::Simulated if live.fell => "simulated: fallen",
             Source::Simulated if live.paused => "simulated: paused",
@@ -152,16 +157,20 @@ impl App {
         ui.label(RichText::new(losses).small().monospace().weak()).on_hover_text(
             "Simulated time that was skipped because the machine was too slow, and samples that the plots missed",
         );
+        ui.separator();
         ui.label(RichText::new(state).small());
     }
 }
 
 fn theme_ui(ui: &mut Ui) {
-    let dark = ui.visuals().dark_mode;
-    let (name, other) = if dark { ("Light", Theme::Light) } else { ("Dark", Theme::Dark) };
-    if ui.button(name).on_hover_text("Switch between light and dark").clicked() {
-        ui.ctx().set_theme(other);
+    let name = if ui.visuals().dark_mode { "Light" } else { "Dark" };
+    if ui.button(name).on_hover_text("Switch between light and dark (Ctrl+D)").clicked() {
+        switch_theme(ui);
     }
+}
+
+fn switch_theme(ui: &Ui) {
+    ui.ctx().set_theme(if ui.visuals().dark_mode { Theme::Light } else { Theme::Dark });
 }
 
 fn help_ui(ui: &mut Ui) {

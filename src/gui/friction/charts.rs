@@ -6,6 +6,7 @@ use flqr_core::friction::Stribeck;
 
 use super::fit::FitRun;
 use crate::context::ViewContext;
+use crate::plot::Axes;
 use crate::theme::palette;
 use crate::widgets::section_ui;
 
@@ -23,27 +24,31 @@ pub(super) fn ui(context: &ViewContext<'_>, fit: &FitRun, ui: &mut Ui) {
     });
 }
 
-fn chart<'a>(id: &'a str, size: egui::Vec2) -> Plot<'a> {
-    Plot::new(id)
-        .width(size.x.max(1.0))
-        .height(size.y.max(1.0))
-        .allow_scroll(false)
-        .y_axis_min_width(48.0)
-        .y_axis_formatter(|mark, _| crate::plot::tick(mark.value, mark.step_size))
+fn chart<'a>(ui: &Ui, size: egui::Vec2, x_label: &'a str, y_label: &'a str) -> Plot<'a> {
+    let plot =
+        Plot::new(("chart", x_label)).width(size.x.max(1.0)).height(size.y.max(1.0)).allow_scroll(false);
+    Axes { x_label: Some(x_label), y_label, x_lines: 0.016 * f64::from(size.x), y_lines: 5.0 }
+        .on(plot, ui.visuals())
 }
 
 fn curve_plot(context: &ViewContext<'_>, fit: &FitRun, ui: &mut Ui, size: egui::Vec2) {
     let colors = palette(ui.visuals());
-    let pairs: Vec<[f64; 2]> = fit.report.iter().flat_map(|report| &report.pairs)
+    let pairs: Vec<[f64; 2]> = fit
+        .report
+        .iter()
+        .flat_map(|report| &report.pairs)
         .map(|pair| [pair.speed_rad_s, pair.torque_nm])
         .filter(|pair| pair[0].is_finite() && pair[1].is_finite())
         .collect();
     let reach = pairs.iter().map(|pair| pair[0].abs()).fold(0.0, f64::max);
     let reach = if reach > 0.0 { reach } else { DEFAULT_SPEED_RAD_S };
-    let plot = chart("curve", size)
-        .x_axis_label("motor speed [rad/s]")
-        .y_axis_label("friction torque [N m]")
-        .legend(Legend::default().follow_insertion_order(true).background_alpha(0.6))
+    let plot = chart(ui, size, "motor speed [rad/s]", "friction torque [N m]")
+        .legend(
+            Legend::default()
+                .position(egui_plot::Corner::LeftTop)
+                .follow_insertion_order(true)
+                .background_alpha(0.6),
+        )
         .label_formatter(|position| match position {
             egui_plot::HoverPosition::NearDataPoint { plot_name, position, .. } => {
                 Some(format!("{plot_name}\n{:.3} rad/s\n{:.4} N m", position.x, position.y))
@@ -86,15 +91,12 @@ fn convergence_plot(fit: &FitRun, ui: &mut Ui, size: egui::Vec2) {
     let color = palette(ui.visuals()).accent;
     let unit = fit.report.as_ref().map_or("N m", |report| report.rmse_unit);
     let label = format!("log₁₀ of the error [{unit}]");
-    let plot = chart("convergence", size)
-        .x_axis_label("iteration")
-        .y_axis_label(label)
-        .label_formatter(|position| match position {
-            egui_plot::HoverPosition::NearDataPoint { position, .. } => {
-                Some(format!("iteration {:.0}\nerror {:.4e}", position.x, 10.0_f64.powf(position.y)))
-            }
-            egui_plot::HoverPosition::Elsewhere { .. } => None,
-        });
+    let plot = chart(ui, size, "iteration", &label).label_formatter(|position| match position {
+        egui_plot::HoverPosition::NearDataPoint { position, .. } => {
+            Some(format!("iteration {:.0}\nerror {:.4e}", position.x, 10.0_f64.powf(position.y)))
+        }
+        egui_plot::HoverPosition::Elsewhere { .. } => None,
+    });
     plot.show(ui, |plot_ui| {
         let points = PlotPoints::from(fit.convergence.clone());
         plot_ui.line(Line::new("best error", points).color(color).width(1.8));

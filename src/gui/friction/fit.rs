@@ -117,7 +117,8 @@ impl FitRun {
         self.job = None;
         Some(match result {
             Ok(report) => {
-                let text = format!("The fit ended with an error of {:.3e} {}.", report.rmse, report.rmse_unit);
+                let text =
+                    format!("The fit ended with an error of {:.3e} {}.", report.rmse, report.rmse_unit);
                 self.show_history(&report);
                 self.report = Some(report);
                 text

@@ -128,7 +128,8 @@ fn load(path: &Path, map: &ColumnMap, generation: u64, reporter: &Reporter<LoadP
         reporter.progress(LoadProgress { bytes: progress.bytes, total_bytes, rows })
     };
     let reader = BufReader::with_capacity(1 << 16, file);
-    let log = read_log(reader, &source, &ReadOptions::new(map), &mut watch).map_err(|error| error.to_string())?;
+    let log =
+        read_log(reader, &source, &ReadOptions::new(map), &mut watch).map_err(|error| error.to_string())?;
     let health = data_health(&log);
     Ok(Box::new(LoadedLog {
         kind: log.kind().map_err(|error| error.to_string()),
@@ -156,8 +157,11 @@ fn axis(log: &Log) -> Axis {
 }
 
 fn median_step(time: &[f64]) -> Option<f64> {
-    let mut steps: Vec<f64> =
-        time.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| step.is_finite() && *step > 0.0).collect();
+    let mut steps: Vec<f64> = time
+        .windows(2)
+        .map(|pair| pair[1] - pair[0])
+        .filter(|step| step.is_finite() && *step > 0.0)
+        .collect();
     let middle = steps.len() / 2;
     (!steps.is_empty()).then(|| *steps.select_nth_unstable_by(middle, f64::total_cmp).1)
 }

@@ -117,12 +117,14 @@ impl FrictionTab {
                 });
             },
         );
-        Panel::right("result").frame(side).resizable(true).default_size(300.0).size_range(250.0..=460.0).show(
-            ui,
-            |ui| {
+        Panel::right("result")
+            .frame(side)
+            .resizable(true)
+            .default_size(300.0)
+            .size_range(250.0..=460.0)
+            .show(ui, |ui| {
                 ScrollArea::vertical().show(ui, |ui| result::ui(context, &self.fit, ui));
-            },
-        );
+            });
         let middle = Frame::central_panel(ui.style()).inner_margin(Margin::symmetric(10, 6));
         CentralPanel::default().frame(middle).show(ui, |ui| {
             let half = 0.5 * ui.available_height();

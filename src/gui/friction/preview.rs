@@ -58,8 +58,10 @@ impl Preview {
 
     fn controls_ui(&mut self, loaded: &LoadedLog, ui: &mut Ui) {
         ui.scope(|ui| {
-            let choices =
-                [(Show::Rows, "Rows", "The first rows as numbers"), (Show::Plot, "Plot", "One column as a curve")];
+            let choices = [
+                (Show::Rows, "Rows", "The first rows as numbers"),
+                (Show::Plot, "Plot", "One column as a curve"),
+            ];
             choice_ui(ui, &mut self.show, &choices);
         });
         if self.show == Show::Rows {
@@ -81,9 +83,7 @@ impl Preview {
     /// The chosen column, at first the one that matters for friction.
     fn column(&self, loaded: &LoadedLog) -> usize {
         let position = |name: &str| loaded.log.columns.iter().position(|column| column.name == name);
-        let first = || {
-            ["torque_nm", "force_n", "torque_left_nm"].into_iter().find_map(position).unwrap_or(0)
-        };
+        let first = || ["torque_nm", "force_n", "torque_left_nm"].into_iter().find_map(position).unwrap_or(0);
         self.column.filter(|column| *column < loaded.log.columns.len()).unwrap_or_else(first)
     }
 
@@ -128,11 +128,9 @@ fn empty_ui(ui: &mut Ui) {
     ui.vertical_centered(|ui| {
         ui.label("No log yet.");
         hint_ui(ui, "Open, type or drop a CSV file whose columns carry their units, such as:");
-        for columns in [
-            "time_s, motor_angle_rad, torque_nm",
-            "speed_rad_s, torque_nm",
-            "time_s, position_m, force_n",
-        ] {
+        for columns in
+            ["time_s, motor_angle_rad, torque_nm", "speed_rad_s, torque_nm", "time_s, position_m, force_n"]
+        {
             ui.label(mono(columns));
         }
     });

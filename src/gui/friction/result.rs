@@ -1,7 +1,7 @@
 //! The result: parameters with intervals, warnings, and the way into the model.
 
 use egui::{Grid, RichText, Ui};
-use flqr_core::identify::{FitReport, StopReason};
+use flqr_core::identify::{Estimate, FitReport, StopReason};
 
 use super::fit::FitRun;
 use crate::command::{Command, Target};
@@ -59,24 +59,34 @@ fn stop_text(stop: StopReason) -> &'static str {
     match stop {
         StopReason::Converged => "converged",
         StopReason::MaxIterations => "stopped at the last iteration",
-        StopReason::Cancelled => "cancelled: the best so far",
+        StopReason::ErrorThreshold => "stopped below the error threshold",
     }
 }
 
+/// Key, name, unit and estimate of each parameter, in the order of Eq. 28.
+fn in_order(report: &FitReport) -> Vec<(&'static str, &'static str, &'static str, Estimate)> {
+    let mut rows: Vec<_> = report
+        .parameters
+        .iter()
+        .map(|(key, estimate)| {
+            let place = NAMES.iter().position(|(name, ..)| name == key);
+            let (name, unit) = place.map_or((*key, ""), |place| (NAMES[place].1, NAMES[place].2));
+            (place.unwrap_or(NAMES.len()), (*key, name, unit, *estimate))
+        })
+        .collect();
+    rows.sort_by_key(|(place, _)| *place);
+    rows.into_iter().map(|(_, row)| row).collect()
+}
+
 fn parameters_ui(report: &FitReport, ui: &mut Ui) {
-    Grid::new("parameters").num_columns(3).striped(true).spacing([10.0, 4.0]).show(ui, |ui| {
+    Grid::new("parameters").num_columns(3).striped(true).spacing([14.0, 5.0]).show(ui, |ui| {
         hint_ui(ui, "parameter");
         hint_ui(ui, "value");
         hint_ui(ui, "95 % interval");
         ui.end_row();
-        for (key, estimate) in &report.parameters {
-            let known = NAMES.iter().find(|(name, ..)| name == key);
-            let (name, unit) = known.map_or((*key, ""), |(_, name, unit)| (*name, *unit));
-            ui.vertical(|ui| {
-                ui.spacing_mut().item_spacing.y = 0.0;
-                ui.label(name).on_hover_text(*key);
-                ui.label(RichText::new(unit).small().weak());
-            });
+        for (key, name, unit, estimate) in in_order(report) {
+            let text = if unit.is_empty() { name.to_owned() } else { format!("{name} [{unit}]") };
+            ui.add(egui::Label::new(RichText::new(text).small()).extend()).on_hover_text(key);
             ui.label(mono(shown(estimate.value, 4)));
             let interval = estimate.ci95.map_or_else(
                 || "none".to_owned(),

@@ -5,11 +5,14 @@ use std::path::PathBuf;
 use egui::{ProgressBar, RichText, TextEdit, Ui};
 use flqr_core::record::{ColumnMap, Mapping, Severity};
 
-use super::load::Loader;
+use super::load::{LoadedLog, Loader};
 use crate::command::{Command, FilePurpose};
 use crate::context::ViewContext;
 use crate::theme::palette;
 use crate::widgets::{error_ui, hint_ui, section_ui, warning_ui};
+
+/// Line problems that are shown one by one.
+const SHOWN_PROBLEMS: usize = 3;
 
 /// What has been typed.
 pub(super) struct SourceForm {
@@ -46,7 +49,7 @@ impl SourceForm {
                 hint_ui(ui, "The log of before is still there.");
             }
         }
-        progress_ui(context, loader, ui);
+        progress_ui(loader, ui);
     }
 
     fn path_ui(&mut self, ui: &mut Ui) -> bool {
@@ -102,7 +105,7 @@ impl SourceForm {
     }
 }
 
-fn progress_ui(_context: &ViewContext<'_>, loader: &Loader, ui: &mut Ui) {
+fn progress_ui(loader: &Loader, ui: &mut Ui) {
     if !loader.is_running() {
         return;
     }
@@ -122,9 +125,10 @@ pub(super) fn health_ui(loader: &Loader, ui: &mut Ui) {
     if let Err(problem) = &loaded.kind {
         error_ui(ui, problem);
     }
-    if loaded.health.is_empty() && loaded.kind.is_ok() {
+    if loaded.health.is_empty() && loaded.kind.is_ok() && loaded.log.problem_count == 0 {
         ui.label(RichText::new("nothing wrong was found").small().color(colors.good));
     }
+    line_problems_ui(loaded, ui);
     for finding in &loaded.health {
         let (mark, color) = match finding.severity {
             Severity::Info => ("note", colors.measured),
@@ -140,5 +144,18 @@ pub(super) fn health_ui(loader: &Loader, ui: &mut Ui) {
             ui.label(RichText::new(&finding.problem).small());
             ui.label(RichText::new(format!("→ {}", finding.mend)).small().weak());
         });
+    }
+}
+
+/// The first rows and cells that could not be used, where they are in the file.
+fn line_problems_ui(loaded: &LoadedLog, ui: &mut Ui) {
+    let log = &loaded.log;
+    if log.problem_count == 0 {
+        return;
+    }
+    let count = format!("{} rows left out, {} problems in lines", log.dropped_rows, log.problem_count);
+    warning_ui(ui, count);
+    for problem in log.problems.iter().take(SHOWN_PROBLEMS) {
+        ui.label(RichText::new(problem.to_string()).small().weak());
     }
 }

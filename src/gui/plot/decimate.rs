@@ -60,7 +60,13 @@ pub struct DecimationCache {
 impl DecimationCache {
     /// The visible part of `curve` between `range[0]` and `range[1]`, for a plot `columns` pixels wide.
     /// `generation` must change whenever the curve's data do.
-    pub fn visible(&mut self, curve: Curve<'_>, generation: u64, range: [f64; 2], columns: usize) -> &Visible {
+    pub fn visible(
+        &mut self,
+        curve: Curve<'_>,
+        generation: u64,
+        range: [f64; 2],
+        columns: usize,
+    ) -> &Visible {
         let bits = [range[0], range[1], curve.scale].map(f64::to_bits);
         let key = Some((generation, bits, columns));
         if self.key != key {
@@ -78,8 +84,8 @@ pub fn decimate(curve: Curve<'_>, range: [f64; 2], columns: usize) -> Visible {
     if length == 0 || !valid {
         return Visible::default();
     }
-    let inside =
-        curve.x[..length].partition_point(|&x| x < range[0])..curve.x[..length].partition_point(|&x| x <= range[1]);
+    let inside = curve.x[..length].partition_point(|&x| x < range[0])
+        ..curve.x[..length].partition_point(|&x| x <= range[1]);
     // One sample beyond each end keeps the line going to the edge of the plot.
     let drawn = inside.start.saturating_sub(1)..(inside.end + 1).min(length);
     let statistics = statistics(&curve.y[inside], curve.scale);

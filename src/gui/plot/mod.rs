@@ -1,8 +1,9 @@
 //! Plots over a shared horizontal range: decimated, following or held, with exact statistics.
 
+mod axes;
 mod decimate;
 mod view;
 
+pub(crate) use axes::Axes;
 pub use decimate::{Curve, DecimationCache, RangeStatistics, Visible, decimate};
 pub use view::{TimePlot, TimeView};
-pub(crate) use view::tick;

@@ -1,12 +1,11 @@
 //! One plot of a stack, and the horizontal range that the stack shares.
 
-use egui::{Color32, Response, Ui, Vec2};
+use egui::{Color32, Response, Ui};
 use egui_plot::{Line, Plot, PlotPoints};
 
+use super::axes::{Axes, Y_AXIS_WIDTH};
 use super::decimate::{Curve, DecimationCache, RangeStatistics, Visible};
 
-/// Width kept for the vertical axis, so that stacked plots line up.
-const AXIS_WIDTH: f32 = 52.0;
 /// The shortest range that can be zoomed to.
 const MIN_SPAN: f64 = 1e-3;
 
@@ -93,7 +92,7 @@ impl TimePlot<'_> {
         curve: Curve<'_>,
         generation: u64,
     ) -> Option<RangeStatistics> {
-        let columns = (ui.available_width() - AXIS_WIDTH).max(1.0) * ui.ctx().pixels_per_point();
+        let columns = (ui.available_width() - Y_AXIS_WIDTH).max(1.0) * ui.ctx().pixels_per_point();
         let range = view.range();
         let visible = cache.visible(curve, generation, range, columns as usize);
         let response = self.draw(ui, visible, range);
@@ -103,7 +102,8 @@ impl TimePlot<'_> {
 
     fn draw(&self, ui: &mut Ui, visible: &Visible, range: [f64; 2]) -> (Response, egui_plot::PlotTransform) {
         let y_range = y_range(visible.statistics, self.min_y_span);
-        let mut plot = Plot::new(self.id)
+        let axes = Axes { x_label: self.x_label, y_label: self.label, x_lines: 8.0, y_lines: 4.0 };
+        let plot = Plot::new(self.id)
             .height(self.height.max(1.0))
             .allow_drag(false)
             .allow_zoom(false)
@@ -111,14 +111,8 @@ impl TimePlot<'_> {
             .allow_boxed_zoom(false)
             .allow_double_click_reset(false)
             .allow_axis_zoom_drag(false)
-            .show_axes([self.x_label.is_some(), true])
-            .y_axis_label(self.label)
-            .y_axis_min_width(AXIS_WIDTH)
-            .y_axis_formatter(|mark, _| tick(mark.value, mark.step_size))
             .label_formatter(|_| None);
-        if let Some(label) = self.x_label {
-            plot = plot.x_axis_label(label);
-        }
+        let plot = axes.on(plot, ui.visuals());
         let shown = plot.show(ui, |plot_ui| {
             plot_ui.set_plot_bounds_x(range[0]..=range[1]);
             plot_ui.set_plot_bounds_y(y_range[0]..=y_range[1]);
@@ -145,14 +139,6 @@ fn y_range(statistics: Option<RangeStatistics>, min_span: f64) -> [f64; 2] {
     [center - half, center + half]
 }
 
-/// A tick with the decimals that its step needs.
-pub(crate) fn tick(value: f64, step: f64) -> String {
-    let decimals = (-step.abs().log10().floor()).clamp(0.0, 9.0) as usize;
-    let text = format!("{value:.decimals$}");
-    let zero = text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.');
-    if zero { text.trim_start_matches('-').to_owned() } else { text.replace('-', "−") }
-}
-
 fn interact(ui: &Ui, response: &Response, transform: egui_plot::PlotTransform, view: &mut TimeView) {
     let per_point = view.span / f64::from(transform.frame().width().max(1.0));
     if response.dragged() {
@@ -170,7 +156,6 @@ fn interact(ui: &Ui, response: &Response, transform: egui_plot::PlotTransform, v
     if wheel.x != 0.0 {
         view.pan(-f64::from(wheel.x) * per_point);
     }
-    debug_assert!(Vec2::from(wheel).is_finite(), "input is finite");
 }
 
 #[cfg(test)]
@@ -199,12 +184,5 @@ mod tests {
         assert!(view.span >= MIN_SPAN);
         view.zoom(1e-9, 4.0);
         assert!(view.span <= 12.0);
-    }
-
-    #[test]
-    fn ticks_have_the_decimals_of_their_step() {
-        assert_eq!(tick(-0.15, 0.05), "−0.15");
-        assert_eq!(tick(-0.0, 0.1), "0.0");
-        assert_eq!(tick(20.0, 10.0), "20");
     }
 }

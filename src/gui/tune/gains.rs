@@ -33,7 +33,9 @@ pub(super) fn ui(context: &ViewContext<'_>, ui: &mut Ui) {
     poles_ui(ui, &designed.design);
     ui.horizontal(|ui| {
         hint_ui(ui, format!("Riccati residual {}", shown(designed.design.riccati_residual, 2)))
-            .on_hover_text("Of AᵀP + PA + Q − PBR⁻¹BᵀP, relative to its terms: how exact P is");
+            .on_hover_text(
+                "Norm of AᵀP + PA − PBR⁻¹BᵀP + Q relative to that of P: how exact the solution is",
+            );
         hint_ui(ui, format!("solved in {:.1} µs", 1e6 * designer.solve_s))
             .on_hover_text("Duration of the last design, from the weights to gains, poles and residual");
     });
@@ -55,7 +57,7 @@ fn comparison_buttons_ui(context: &ViewContext<'_>, ui: &mut Ui) {
 fn gain_table_ui(context: &ViewContext<'_>, ui: &mut Ui, designed: &Designed) {
     let reference = context.designer.reference.filter(|reference| reference.design != designed.design);
     Grid::new("gains").num_columns(5).spacing([10.0, 3.0]).min_col_width(48.0).show(ui, |ui| {
-        hint_ui(ui, "K");
+        hint_ui(ui, "motor");
         for (name, unit) in COLUMNS {
             hint_ui(ui, name).on_hover_text(unit);
         }
@@ -69,9 +71,9 @@ fn gain_table_ui(context: &ViewContext<'_>, ui: &mut Ui, designed: &Designed) {
 
 fn gain_rows_ui(ui: &mut Ui, design: &LqrDesign, prefix: &str, color: egui::Color32) {
     let equal = rows_are_equal(design);
-    let rows: &[(usize, &str)] = if equal { &[(0, "each motor")] } else { &[(0, "left"), (1, "right")] };
+    let rows: &[(usize, &str)] = if equal { &[(0, "each")] } else { &[(0, "left"), (1, "right")] };
     for (row, name) in rows {
-        hint_ui(ui, format!("{prefix}{name}"));
+        ui.label(RichText::new(format!("{prefix}{name}")).small().weak());
         for column in 0..4 {
             ui.label(mono(shown(design.gain[(*row, column)], 4)).color(color));
         }
@@ -89,6 +91,7 @@ fn rows_are_equal(design: &LqrDesign) -> bool {
 
 fn poles_ui(ui: &mut Ui, design: &LqrDesign) {
     ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing.x = 12.0;
         hint_ui(ui, "poles, 1/s").on_hover_text("Of the closed loop A − BK, without delay and friction");
         for text in pole_texts(design) {
             ui.label(mono(text));

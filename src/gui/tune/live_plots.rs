@@ -9,7 +9,7 @@ use crate::context::ViewContext;
 use crate::history::{Channel, HISTORY_S};
 use crate::plot::{Curve, DecimationCache, RangeStatistics, TimePlot, TimeView};
 use crate::theme::palette;
-use crate::widgets::{choice_ui, error_ui, mono, number_ui, shown, warning_ui};
+use crate::widgets::{choice_ui, error_ui, mono, number_ui, warning_ui};
 
 /// Longer steps in time are drawn as gaps, s.
 const GAP_S: f64 = 0.02;
@@ -56,7 +56,10 @@ impl LivePlots {
             self.view_ui(context, ui);
         });
         if context.live.fell {
-            warning_ui(ui, "The robot fell (pitch beyond 0.8 rad) and is stopped. Reset puts it upright again.");
+            warning_ui(
+                ui,
+                "The robot fell (pitch beyond 0.8 rad) and is stopped. Reset puts it upright again.",
+            );
         }
         if let Some(problem) = &context.live.problem {
             error_ui(ui, format!("The simulated robot did not take the change: {problem}."));
@@ -69,7 +72,8 @@ impl LivePlots {
         if push.clicked() {
             context.commands.send(Command::Push { force_n: self.push_n, duration_s: self.push_s });
         }
-        number_ui(ui, &mut self.push_n, "push force", 40.0).on_hover_text("Force of the push; negative: backward");
+        number_ui(ui, &mut self.push_n, "push force", 40.0)
+            .on_hover_text("Force of the push; negative: backward");
         ui.label("N for");
         number_ui(ui, &mut self.push_s, "push duration", 40.0).on_hover_text("Duration of the push");
         self.push_s = self.push_s.clamp(0.001, 10.0);
@@ -77,8 +81,9 @@ impl LivePlots {
     }
 
     fn view_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
-        ui.toggle_value(&mut self.view.follow, "Follow")
-            .on_hover_text("Keep the newest sample in view. Dragging a plot holds it; a double click follows again.");
+        ui.toggle_value(&mut self.view.follow, "Follow").on_hover_text(
+            "Keep the newest sample in view. Dragging a plot holds it; a double click follows again.",
+        );
         let shown = SPANS_S.iter().find(|(span, _)| *span == self.view.span);
         let text = shown.map_or_else(|| format!("{:.1} s", self.view.span), |(_, name)| (*name).to_owned());
         let combo = ComboBox::from_id_salt("span").selected_text(text).width(52.0).show_ui(ui, |ui| {
@@ -88,7 +93,10 @@ impl LivePlots {
                 }
             }
         });
-        combo.response.on_hover_text("Length of the time axis; up to 60 s are kept").accessible_name("time span");
+        combo
+            .response
+            .on_hover_text("Length of the time axis; up to 60 s are kept")
+            .accessible_name("time span");
         let rate = RATES.iter().find(|(ms, _)| *ms == self.interval_ms).map_or("", |(_, name)| name);
         let combo = ComboBox::from_id_salt("rate").selected_text(rate).width(56.0).show_ui(ui, |ui| {
             for (interval_ms, name) in RATES {
@@ -100,7 +108,7 @@ impl LivePlots {
         });
         combo.response.on_hover_text("How often the plots are drawn").accessible_name("frame rate");
         ui.scope(|ui| {
-            let choices = [(true, "°", "Pitch in degrees"), (false, "rad", "Pitch in radians")];
+            let choices = [(true, "deg", "Pitch in degrees"), (false, "rad", "Pitch in radians")];
             choice_ui(ui, &mut self.degrees, &choices);
         });
     }
@@ -124,12 +132,8 @@ impl LivePlots {
                 x_label: last.then_some("time [s]"),
                 min_y_span: quantity.min_span,
             };
-            let curve = Curve {
-                x: history.time_s(),
-                y: history.channel(channel),
-                scale: quantity.scale,
-                gap: GAP_S,
-            };
+            let curve =
+                Curve { x: history.time_s(), y: history.channel(channel), scale: quantity.scale, gap: GAP_S };
             let (view, cache) = (&mut self.view, &mut self.caches[index]);
             ui.horizontal_top(|ui| {
                 let width = (ui.available_width() - STATISTICS_WIDTH).max(1.0);
@@ -191,12 +195,23 @@ fn statistics_ui(ui: &mut Ui, quantity: &Quantity, statistics: Option<RangeStati
     let rows = statistics.map_or([("mean", f64::NAN), ("std", f64::NAN), ("p-p", f64::NAN)], |s| {
         [("mean", s.mean), ("std", s.std), ("p-p", s.peak_to_peak())]
     });
+    let peak_to_peak = statistics.map_or(0.0, |s| s.peak_to_peak());
     for (name, value) in rows {
         let help = match name {
             "mean" => "Mean of the visible samples",
             "std" => "Standard deviation of the visible samples",
             _ => "Peak to peak: largest minus smallest visible sample",
         };
-        ui.label(mono(format!("{name:<5}{:>9}", shown(value, 3)))).on_hover_text(help);
+        let text = format!("{name:<4}{:>10}", to_scale(value, peak_to_peak));
+        ui.label(mono(text)).on_hover_text(help);
     }
+}
+
+/// `value` with the decimals that make three digits of `scale`, so that numbers below each other compare.
+fn to_scale(value: f64, scale: f64) -> String {
+    if !value.is_finite() {
+        return "–".to_owned();
+    }
+    let decimals = if scale > 0.0 { (2.0 - scale.log10().floor()).clamp(0.0, 7.0) as usize } else { 3 };
+    format!("{value:.decimals$}").replace('-', "−")
 }

@@ -92,21 +92,25 @@ impl TuneTab {
             no_robot_ui(context, ui);
             return;
         }
-        Panel::left("weights").frame(side).resizable(true).default_size(338.0).size_range(300.0..=460.0).show(
-            ui,
-            |ui| {
+        Panel::left("weights")
+            .frame(side)
+            .resizable(true)
+            .default_size(338.0)
+            .size_range(300.0..=460.0)
+            .show(ui, |ui| {
                 ScrollArea::vertical().show(ui, |ui| {
                     self.weights.ui(context, ui);
                     gains::ui(context, ui);
                     gains::feedforward_ui(context, ui);
                 });
-            },
-        );
+            });
         let bottom = Frame::central_panel(ui.style()).inner_margin(Margin::symmetric(10, 6));
-        Panel::bottom("predicted").frame(bottom).resizable(true).default_size(206.0).size_range(120.0..=420.0).show(
-            ui,
-            |ui| self.predicted.ui(context, ui),
-        );
+        Panel::bottom("predicted")
+            .frame(bottom)
+            .resizable(true)
+            .default_size(206.0)
+            .size_range(120.0..=420.0)
+            .show(ui, |ui| self.predicted.ui(context, ui));
         CentralPanel::default().frame(bottom).show(ui, |ui| match context.source {
             Source::Simulated => self.plots.ui(context, ui),
             Source::Can => not_connected_ui(context, ui),

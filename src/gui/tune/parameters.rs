@@ -87,7 +87,7 @@ impl ParameterEditor {
         Grid::new("robot").num_columns(3).spacing([8.0, 3.0]).show(ui, |ui| {
             for (key, name, unit, help, value) in ROBOT_FIELDS {
                 ui.label(name).on_hover_text(help);
-                number_ui(ui, value(robot), name, 64.0).on_hover_text(help);
+                number_ui(ui, value(robot), &format!("{name} value"), 64.0).on_hover_text(help);
                 ui.label(unit);
                 ui.end_row();
                 problem_row_ui(ui, refused.as_ref(), key);

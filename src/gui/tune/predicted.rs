@@ -1,12 +1,15 @@
 //! What the linear model predicts for the gains in force and for A: responses and poles.
 
 use egui::{Ui, vec2};
-use egui_plot::{HLine, Legend, Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotPoints, Points, VLine};
+use egui_plot::{
+    Corner, HLine, Legend, Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotPoints, Points, VLine,
+};
 use flqr_core::robot::State;
 use flqr_core::simulate::predicted_response;
 
 use crate::context::ViewContext;
 use crate::design::Designed;
+use crate::plot::Axes;
 use crate::theme::{Palette, palette};
 
 /// The response starts displaced by this, at rest and upright, m.
@@ -84,8 +87,8 @@ fn duration_s(designed: &Designed) -> f64 {
     [1.0, 2.0, 3.0, 5.0, 8.0, 12.0, 20.0, 30.0, 60.0].into_iter().find(|s| *s >= wanted).unwrap_or(60.0)
 }
 
-fn quiet_plot<'a>(id: &'a str, size: egui::Vec2) -> Plot<'a> {
-    Plot::new(id)
+fn quiet_plot<'a>(ui: &Ui, size: egui::Vec2, x_label: &'a str, y_label: &'a str) -> Plot<'a> {
+    let plot = Plot::new(("predicted", y_label))
         .width(size.x.max(1.0))
         .height(size.y.max(1.0))
         .allow_drag(false)
@@ -93,9 +96,8 @@ fn quiet_plot<'a>(id: &'a str, size: egui::Vec2) -> Plot<'a> {
         .allow_scroll(false)
         .allow_boxed_zoom(false)
         .allow_axis_zoom_drag(false)
-        .y_axis_min_width(40.0)
-        .y_axis_formatter(|mark, _| crate::plot::tick(mark.value, mark.step_size))
-        .label_formatter(|_| None)
+        .label_formatter(|_| None);
+    Axes { x_label: Some(x_label), y_label, x_lines: 4.0, y_lines: 4.0 }.on(plot, ui.visuals())
 }
 
 fn response_plot(
@@ -107,10 +109,10 @@ fn response_plot(
     pick: Pick,
     colors: Palette,
 ) {
-    let plot = quiet_plot(label, size)
-        .x_axis_label("time [s]")
-        .y_axis_label(label)
-        .legend(Legend::default().follow_insertion_order(true).background_alpha(0.6));
+    // The displacement ends at the top, the pitch begins there.
+    let corner = if label.starts_with("pitch") { Corner::RightTop } else { Corner::RightBottom };
+    let plot = quiet_plot(ui, size, "time [s]", label)
+        .legend(Legend::default().position(corner).follow_insertion_order(true).background_alpha(0.6));
     plot.show(ui, |plot_ui| {
         if let Some(old) = old {
             plot_ui.line(
@@ -135,9 +137,7 @@ fn pole_plot(ui: &mut Ui, size: egui::Vec2, new: &Designed, old: Option<&Designe
         let finite = designed.design.poles.iter().filter(|pole| pole.re.is_finite() && pole.im.is_finite());
         finite.map(|pole| [pole.re, pole.im]).collect()
     };
-    let plot = quiet_plot("poles", size)
-        .x_axis_label("poles, real [1/s]")
-        .y_axis_label("imaginary [1/s]")
+    let plot = quiet_plot(ui, size, "poles, real [1/s]", "imaginary [1/s]")
         .include_x(0.5)
         .include_y(-1.0)
         .include_y(1.0)

@@ -48,7 +48,7 @@ impl WeightEditor {
     pub(super) fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
         section_ui(ui, "Weights", |ui| {
             let help = "Back to the weights of the loaded model";
-            if ui.small_button("Reset").on_hover_text(help).clicked() {
+            if ui.small_button("Reset weights").on_hover_text(help).clicked() {
                 context.commands.send(Command::ResetWeights);
             }
         });

@@ -1,0 +1,133 @@
+#!/usr/bin/env bash
+# Opens the window in a real X server, drives it like a person, and pictures it.
+#
+#   .ci/window.sh BINARY OUTDIR [LOG]
+#
+# Changes a weight, loads LOG by its typed path (without LOG: friction pairs made here) and fits it; checks by
+# the program's own account (--state-out) that each step happened, and by the pictures that they are not blank
+# and differ. Needs Xvfb, openbox, xdotool, imagemagick and jq. Ends only the
+# processes it started.
+set -euo pipefail
+
+usage="usage: .ci/window.sh BINARY OUTDIR [LOG]"
+binary=$(realpath "${1:?$usage}")
+mkdir -p "${2:?$usage}"
+out=$(realpath "$2")
+log=${3:+$(realpath "$3")}
+state="$out/state.json"
+size=1280x800
+
+started=()
+cleanup() {
+    for ((i = ${#started[@]} - 1; i >= 0; i--)); do
+        kill "${started[i]}" 2>/dev/null || true
+        wait "${started[i]}" 2>/dev/null || true
+    done
+    rm -rf "$scratch"
+}
+scratch=$(mktemp -d)
+trap cleanup EXIT
+
+fail() {
+    echo "window.sh: $*" >&2
+    [ -s "$state" ] && cat "$state" >&2
+    [ -s "$scratch/stderr" ] && cat "$scratch/stderr" >&2
+    import -window root "$out/failed.png" 2>/dev/null || true
+    exit 1
+}
+
+# until_state SECONDS WHAT JQ-CONDITION: waits until the condition holds of the state file.
+until_state() {
+    for ((i = 0; i < $1 * 10; i++)); do
+        jq -e "$3" "$state" >/dev/null 2>&1 && return
+        kill -0 "$program" 2>/dev/null || fail "the program ended before: $2"
+        sleep 0.1
+    done
+    fail "did not happen within $1 s: $2"
+}
+
+# picture NAME: a screenshot that is not blank.
+picture() {
+    xdotool mousemove 640 40
+    sleep 0.6
+    import -window root "$out/$1.png"
+    local colours
+    colours=$(identify -format %k "$out/$1.png")
+    [ "$colours" -ge 100 ] || fail "$1.png is blank: it has $colours colours"
+    echo "$1.png: $colours colours"
+}
+
+# differ A B: the pictures differ in at least 500 pixels.
+differ() {
+    local pixels
+    pixels=$(compare -metric AE "$out/$1.png" "$out/$2.png" null: 2>&1 || true)
+    pixels=$(printf '%.0f' "${pixels%% *}")
+    [ "$pixels" -ge 500 ] || fail "$1.png and $2.png are the same ($pixels pixels differ)"
+}
+
+if [ -z "$log" ]; then
+    log="$scratch/pairs.csv"
+    awk 'BEGIN {
+        print "speed_rad_s,torque_nm"
+        for (i = 0; i < 120; i++) {
+            v = -59.5 + i; s = v < 0 ? -1 : 1
+            printf "%.6f,%.6f\n", v, (0.04 + 0.03 * exp(-s * v / 4)) * s + 5e-4 * v + 0.001 * sin(2.4 * i)
+        }
+    }' >"$log"
+fi
+
+# A display number of our own; Xvfb reports the one that it found free.
+mkfifo "$scratch/display"
+exec {display_pipe}<>"$scratch/display"
+Xvfb -displayfd "$display_pipe" -screen 0 "${size}x24" -nolisten tcp >/dev/null 2>&1 &
+started+=($!)
+read -r -t 20 -u "$display_pipe" display || fail "Xvfb did not start"
+export DISPLAY=":$display"
+openbox >/dev/null 2>&1 &
+started+=($!)
+sleep 0.5
+
+rm -f "$state"
+LIBGL_ALWAYS_SOFTWARE=1 XDG_CONFIG_HOME="$scratch" "$binary" --state-out "$state" 2>"$scratch/stderr" &
+program=$!
+started+=("$program")
+window=$(timeout 60 xdotool search --sync --onlyvisible --name '^flqr' | tail -1) || fail "no window appeared"
+xdotool windowactivate --sync "$window" windowmove "$window" 0 0 windowsize "$window" 1278 776
+until_state 30 "the simulated robot runs" '.simulation.seconds >= 2'
+picture tune
+
+echo "changing a weight"
+gain=$(jq -c .gain "$state")
+xdotool key ctrl+e
+sleep 0.5
+xdotool key ctrl+a
+xdotool type --delay 30 450
+xdotool key Return
+until_state 10 "the weight is 450 and the gains are others" ".q_diagonal[0] == 450 and .gain != $gain"
+sleep 1.5
+picture weight
+differ tune weight
+
+echo "loading and fitting $log"
+xdotool key ctrl+l
+sleep 0.5
+xdotool type --delay 15 "$log"
+xdotool key Return
+until_state 60 "the log is loaded" '.friction_tab.log.rows > 0'
+picture log
+xdotool key ctrl+Return
+until_state 120 "the fit has parameters" '.friction_tab.fit.parameters | length > 0'
+picture fit
+differ weight log
+differ log fit
+
+echo "light"
+xdotool key ctrl+d
+sleep 0.8
+picture fit-light
+xdotool key ctrl+1
+until_state 10 "the tune page is back" '.tab == "tune"'
+picture tune-light
+differ tune tune-light
+kill -0 "$program" 2>/dev/null || fail "the program ended by itself"
+echo "window.sh: passed; pictures and state in $out"

@@ -1,0 +1,352 @@
+//! The window without a window: every page driven by the names that a screen reader would use.
+
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use egui::{Event, Key, Modifiers, PointerButton, Pos2, Vec2, vec2};
+use egui_kittest::{Harness, kittest::Queryable};
+use flqr_core::model_file::Model;
+use flqr_gui::{App, Tab, WindowOptions};
+use serde_json::Value;
+
+const PAPER: &str = include_str!("../../../presets/paper.toml");
+const SIZE: Vec2 = vec2(1280.0, 800.0);
+
+/// The app is made in the first frame, because it needs the context.
+type Window = Harness<'static, Option<App>>;
+
+fn options(tab: Tab) -> WindowOptions {
+    let model = Model::from_toml(PAPER, "presets/paper.toml").unwrap();
+    WindowOptions { tab, paused: true, ..WindowOptions::new(model) }
+}
+
+fn open(options: WindowOptions, size: Vec2) -> Window {
+    let mut window = Harness::builder().with_size(size).build_ui_state(
+        move |ui: &mut egui::Ui, app: &mut Option<App>| {
+            let app = app.get_or_insert_with(|| App::new(options.clone(), ui.ctx()).unwrap());
+            app.logic(ui.ctx());
+            app.ui(ui);
+        },
+        None,
+    );
+    window.run_steps(3);
+    window
+}
+
+fn state(window: &Window) -> Value {
+    window.state().as_ref().unwrap().snapshot()
+}
+
+/// Frames until `done` holds of the window's state; workers get their time between them.
+fn until(window: &mut Window, what: &str, done: impl Fn(&Value) -> bool) -> Value {
+    let start = Instant::now();
+    loop {
+        window.step();
+        let state = state(window);
+        if done(&state) {
+            return state;
+        }
+        assert!(start.elapsed() < Duration::from_secs(120), "{what} did not happen: {state:#}");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+/// Types over what a field holds.
+fn enter(window: &mut Window, label: &str, text: &str) {
+    window.get_by_label(label).click();
+    window.run_steps(2);
+    window.key_press_modifiers(Modifiers::COMMAND, Key::A);
+    window.step();
+    window.event(Event::Text(text.to_owned()));
+    window.step();
+    window.key_press(Key::Enter);
+    window.run_steps(3);
+}
+
+fn click(window: &mut Window, label: &str) {
+    window.get_by_label(label).click();
+    window.run_steps(3);
+}
+
+/// A file that is removed with the test.
+struct TempFile(PathBuf);
+
+impl TempFile {
+    fn new(name: &str, text: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("flqr-gui-{}-{name}", std::process::id()));
+        std::fs::write(&path, text).unwrap();
+        Self(path)
+    }
+
+    fn name(&self) -> &str {
+        self.0.to_str().unwrap()
+    }
+}
+
+impl Drop for TempFile {
+    fn drop(&mut self) {
+        std::fs::remove_file(&self.0).ok();
+    }
+}
+
+/// Pairs on a curve that is quick to fit, with a small, regular deviation.
+fn pairs_csv() -> String {
+    let mut text = String::from("speed_rad_s,torque_nm\n");
+    for index in 0..80 {
+        let speed = -39.5 + f64::from(index);
+        let level = 0.04 + 0.03 * (-speed.abs() / 4.0).exp();
+        let torque = level * speed.signum() + 5e-4 * speed + 0.001 * (f64::from(index) * 2.4).sin();
+        text += &format!("{speed},{torque}\n");
+    }
+    text
+}
+
+#[test]
+fn a_new_weight_gives_new_gains_in_the_same_frame() {
+    let mut window = open(options(Tab::Tune), SIZE);
+    let before = state(&window);
+    enter(&mut window, "pitch weight", "250");
+    let after = state(&window);
+    assert_eq!(after["q_diagonal"][2], 250.0);
+    assert!(after["gain"][0][2].as_f64() < before["gain"][0][2].as_f64(), "{after:#}");
+    assert_eq!(after["unsaved_changes"], true);
+
+    click(&mut window, "Reset weights");
+    assert_eq!(state(&window)["gain"], before["gain"]);
+}
+
+#[test]
+fn a_drag_of_a_slider_changes_the_gains_while_it_lasts() {
+    let mut window = open(options(Tab::Tune), SIZE);
+    let before = state(&window);
+    let slider = window.get_by_label("pitch weight slider").rect();
+    let (from, to) = (slider.center(), slider.center() + vec2(20.0, 0.0));
+    window.drag_at(from);
+    window.step();
+    window.hover_at(to);
+    window.step();
+    assert_ne!(state(&window)["gain"], before["gain"], "while the button is still down");
+    window.drop_at(to);
+    window.run_steps(2);
+    click(&mut window, "Back to A");
+    assert_eq!(state(&window)["gain"], before["gain"], "A is what was in force when the drag began");
+}
+
+#[test]
+fn weights_without_a_design_leave_the_last_gains_in_force_and_say_so() {
+    let mut window = open(options(Tab::Tune), SIZE);
+    let before = state(&window);
+    enter(&mut window, "left torque weight", "-1");
+    let after = state(&window);
+    assert!(after["design_problem"].is_string(), "{after:#}");
+    assert_eq!(after["gain"], before["gain"]);
+    window.get_by_label("The last good gains stay in force; they are shown here.");
+}
+
+#[test]
+fn one_weight_of_the_motors_moves_the_other_unless_unlinked() {
+    let mut window = open(options(Tab::Tune), SIZE);
+    enter(&mut window, "right torque weight", "40");
+    assert_eq!(state(&window)["r_diagonal"], serde_json::json!([40.0, 40.0]));
+    click(&mut window, "Same for both motors");
+    enter(&mut window, "right torque weight", "10");
+    let after = state(&window);
+    assert_eq!(after["r_diagonal"], serde_json::json!([40.0, 10.0]));
+    assert_ne!(after["gain"][0], after["gain"][1]);
+}
+
+#[test]
+fn full_matrices_stay_symmetric_and_reach_the_design() {
+    let mut window = open(options(Tab::Tune), SIZE);
+    let before = state(&window);
+    click(&mut window, "Full matrices");
+    enter(&mut window, "Q displacement, velocity", "5");
+    let after = state(&window);
+    assert!(after["design_problem"].is_null(), "{after:#}");
+    assert_ne!(after["gain"], before["gain"]);
+}
+
+#[test]
+fn a_negative_mass_is_refused_where_it_was_typed() {
+    let mut window = open(options(Tab::Tune), SIZE);
+    let before = state(&window);
+    enter(&mut window, "body mass value", "-3");
+    window.get_by_label_contains("must be a finite number above 0");
+    assert_eq!(state(&window)["gain"], before["gain"]);
+    enter(&mut window, "body mass value", "15");
+    assert_ne!(state(&window)["gain"], before["gain"]);
+}
+
+#[test]
+fn can_is_honest_about_being_not_connected() {
+    let mut window = open(WindowOptions { paused: false, ..options(Tab::Tune) }, SIZE);
+    click(&mut window, "CAN");
+    window.get_by_label("CAN: not connected");
+    window.get_by_label_contains("This version has no CAN link yet");
+    let state = state(&window);
+    assert_eq!((&state["source"], &state["simulation"]["paused"]), (&"can".into(), &true.into()));
+    assert!(window.query_by_label("Push").is_none(), "no controls of the simulated robot");
+    click(&mut window, "Back to the simulated robot");
+    window.get_by_label("Push");
+}
+
+#[test]
+fn the_simulated_robot_runs_is_pushed_paused_and_reset() {
+    let mut window = open(WindowOptions { paused: false, ..options(Tab::Tune) }, SIZE);
+    until(&mut window, "one second of simulation", |s| s["simulation"]["seconds"].as_f64() >= Some(1.0));
+    click(&mut window, "Push");
+    click(&mut window, "LQR");
+    assert_eq!(state(&window)["controller"], "lqr");
+    click(&mut window, "Pause");
+    until(&mut window, "the pause", |s| s["simulation"]["paused"] == true);
+    click(&mut window, "Reset");
+}
+
+#[test]
+fn a_log_is_loaded_by_path_fitted_and_used() {
+    let log = TempFile::new("pairs.csv", &pairs_csv());
+    let mut window = open(options(Tab::Friction), SIZE);
+    enter(&mut window, "log path", log.name());
+    let loaded = until(&mut window, "loading", |s| s["friction_tab"]["log"]["rows"] == 80);
+    assert_eq!(loaded["friction_tab"]["log"]["kind"], "friction_pairs");
+    click(&mut window, "Start fit");
+    let fitted = until(&mut window, "the fit", |s| s["friction_tab"]["fit"]["parameters"].is_object());
+    let coulomb = fitted["friction_tab"]["fit"]["parameters"]["coulomb_nm"]["value"].as_f64().unwrap();
+    assert!(fitted["friction_tab"]["fit"]["rmse"].as_f64().unwrap() < 0.001, "{fitted:#}");
+    click(&mut window, "Right motor");
+    let used = state(&window);
+    assert_eq!(used["friction"][1]["coulomb_nm"].as_f64(), Some(coulomb));
+    assert_eq!(used["friction"][0], loaded["friction"][0], "the left motor is as before");
+    click(&mut window, "Rows");
+    window.get_by_label("speed_rad_s");
+}
+
+#[test]
+fn a_fit_can_be_cancelled() {
+    let log = TempFile::new("cancel.csv", &pairs_csv());
+    let mut window = open(WindowOptions { log: Some(log.0.clone()), ..options(Tab::Friction) }, SIZE);
+    until(&mut window, "loading", |s| s["friction_tab"]["log"]["rows"] == 80);
+    window.key_press_modifiers(Modifiers::COMMAND, Key::Enter);
+    window.step();
+    window.key_press_modifiers(Modifiers::COMMAND, Key::Enter);
+    let ended = until(&mut window, "the end", |s| s["friction_tab"]["fit"]["running"] == false);
+    let fit = &ended["friction_tab"]["fit"];
+    assert!(fit["problem"].is_string() || fit["parameters"].is_object(), "cancelled, or done before: {fit}");
+}
+
+#[test]
+fn bad_logs_and_models_are_refused_in_one_sentence_and_nothing_is_lost() {
+    let good = TempFile::new("good.csv", &pairs_csv());
+    let text = TempFile::new("text.csv", "speed_rad_s,torque_nm\n1,zero\n");
+    let model = TempFile::new("bad.toml", "name = \"x\"\n[robot]\nbody_mas_kg = 1\n");
+    let mut window = open(WindowOptions { log: Some(good.0.clone()), ..options(Tab::Friction) }, SIZE);
+    until(&mut window, "loading", |s| s["friction_tab"]["log"]["rows"] == 80);
+    for path in ["/no/such/folder/log.csv", env!("CARGO_MANIFEST_DIR"), ""] {
+        enter(&mut window, "log path", path);
+        let state = until(&mut window, "refusal", |s| s["friction_tab"]["log"]["loading"] == false);
+        assert_eq!(state["friction_tab"]["log"]["rows"], 80, "the log of before stays");
+    }
+    enter(&mut window, "log path", text.name());
+    until(&mut window, "an answer", |s| s["friction_tab"]["log"]["loading"] == false);
+    enter(&mut window, "column map", "torque_nm");
+    window.get_by_label_contains("column map:");
+
+    let before = state(&window);
+    click(&mut window, "Tune");
+    enter(&mut window, "model path", model.name());
+    let refused = until(&mut window, "refusal", |s| {
+        s["message"].as_str().is_some_and(|message| message.contains("body_mas_kg"))
+    });
+    assert!(refused["message"].as_str().unwrap().contains(":3"), "the line: {}", refused["message"]);
+    assert_eq!(refused["gain"], before["gain"]);
+}
+
+#[test]
+fn a_model_is_saved_and_loaded_back() {
+    let file = TempFile::new("model.toml", "");
+    let mut window = open(options(Tab::Tune), SIZE);
+    enter(&mut window, "velocity weight", "77");
+    window.get_by_label("model path").click();
+    window.run_steps(2);
+    window.event(Event::Text(file.name().to_owned()));
+    window.run_steps(2);
+    click(&mut window, "Save");
+    until(&mut window, "saving", |s| s["unsaved_changes"] == false);
+    enter(&mut window, "velocity weight", "5");
+    click(&mut window, "Load");
+    until(&mut window, "loading", |s| s["q_diagonal"][1] == 77.0);
+}
+
+#[test]
+fn gaps_are_drawn_zoomed_out_and_in() {
+    let mut csv = String::from("time_s,motor_angle_rad,torque_nm\n");
+    for index in 0..3000 {
+        let time = f64::from(index) * 1e-3 + if index < 1500 { 0.0 } else { 4.0 };
+        let torque = if index % 700 == 3 { String::new() } else { format!("{}", (time * 9.0).sin()) };
+        csv += &format!("{time},{},{torque}\n", time * 3.0);
+    }
+    let log = TempFile::new("gap.csv", &csv);
+    let mut window = open(WindowOptions { log: Some(log.0.clone()), ..options(Tab::Friction) }, SIZE);
+    until(&mut window, "loading", |s| s["friction_tab"]["log"]["rows"].as_u64() > Some(2900));
+    let middle = Pos2::new(650.0, 230.0);
+    for delta in [400.0, 400.0, 2000.0, -300.0, -5000.0] {
+        window.hover_at(middle);
+        wheel(&window, delta);
+        window.run_steps(8);
+    }
+}
+
+fn wheel(window: &Window, delta: f32) {
+    window.event(Event::MouseWheel {
+        unit: egui::MouseWheelUnit::Point,
+        delta: vec2(0.0, delta),
+        phase: egui::TouchPhase::Move,
+        source: egui::MouseWheelSource::Unknown,
+        modifiers: Modifiers::NONE,
+    });
+}
+
+#[test]
+fn every_page_survives_any_size() {
+    for tab in [Tab::Tune, Tab::Friction] {
+        for size in [Vec2::ZERO, vec2(1.0, 1.0), vec2(300.0, 200.0), vec2(1920.0, 1080.0)] {
+            open(options(tab), size).run_steps(3);
+        }
+    }
+}
+
+/// A tiny generator: the same events in every run.
+fn next(seed: &mut u64) -> u64 {
+    *seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+    *seed >> 33
+}
+
+#[test]
+fn a_hundred_frames_of_random_input_do_no_harm() {
+    for (tab, mut seed) in [(Tab::Tune, 1), (Tab::Friction, 2)] {
+        let mut window = open(WindowOptions { paused: false, ..options(tab) }, SIZE);
+        for _ in 0..100 {
+            let position = Pos2::new((next(&mut seed) % 1280) as f32, (next(&mut seed) % 800) as f32);
+            window.hover_at(position);
+            match next(&mut seed) % 6 {
+                0 => {
+                    for pressed in [true, false] {
+                        let button = PointerButton::Primary;
+                        let modifiers = Modifiers::NONE;
+                        window.event(Event::PointerButton { pos: position, button, pressed, modifiers });
+                    }
+                }
+                1 => window.drag_at(position),
+                2 => window.drop_at(position),
+                3 => wheel(&window, (next(&mut seed) % 600) as f32 - 300.0),
+                4 => window
+                    .event(Event::Text(["7", "-", "e", ".", "−"][(next(&mut seed) % 5) as usize].into())),
+                _ => {
+                    let keys = [Key::Tab, Key::Enter, Key::ArrowUp, Key::Backspace, Key::Escape, Key::Num2];
+                    window.key_press(keys[(next(&mut seed) % 6) as usize]);
+                }
+            }
+            window.step();
+        }
+    }
+}
