@@ -6,3 +6,6 @@
 mod balance;
 
 pub use balance::{BalanceController, ControlError, ControllerKind, DEFAULT_COMPENSATION, Measurement};
+
+#[cfg(test)]
+mod tests;

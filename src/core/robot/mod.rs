@@ -134,7 +134,7 @@ impl Coefficients {
     /// ẍ and θ̈ of Eqs. 4 and 5 under any loads: `along_nm` drives the wheels (ΣT of the shafts, plus r times
     /// a horizontal force), `about_nm` turns the body about the axle (−ΣT, plus h cos θ times a horizontal
     /// force that acts h above the axle). The state enters by sin θ, cos θ and θ̇.
-    #[inline]
+    #[inline(always)]
     pub fn accelerations(
         &self,
         (sin, cos): (f64, f64),

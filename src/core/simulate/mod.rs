@@ -5,6 +5,7 @@ mod noise;
 mod plant;
 mod response;
 mod sample;
+mod scenario;
 mod sensors;
 mod simulation;
 mod sliding;
@@ -13,6 +14,10 @@ mod statistics;
 pub use plant::{Forcing, Plant};
 pub use response::predicted_response;
 pub use sample::Sample;
+pub use scenario::{Push, Run, Scenario, UnknownScenario};
 pub use sensors::SensorSettings;
 pub use simulation::{FALL_PITCH_RAD, Fall, Simulation, SimulationError, SimulationSettings, TICK_S};
 pub use statistics::{Statistics, Summary};
+
+#[cfg(test)]
+mod tests;

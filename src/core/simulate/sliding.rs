@@ -40,20 +40,21 @@ impl SlidingFriction {
 
     /// Friction at a speed, N m, for shafts that slide in `direction` (1 or −1), also where the speed is
     /// still or already 0.
-    #[inline]
+    #[inline(always)]
     pub(super) fn torque_nm(&self, speed_rad_s: f64, direction: f64) -> f64 {
         let level = self.level_nm(speed_rad_s.abs());
-        direction * level + self.viscous_nm_s_rad * speed_rad_s + self.offset_nm
+        direction * level + (self.viscous_nm_s_rad * speed_rad_s + self.offset_nm)
     }
 
-    #[inline]
+    #[inline(always)]
     fn level_nm(&self, speed: f64) -> f64 {
         let bits = speed.to_bits().wrapping_sub(self.lowest_bits);
         let Some([a, b, c, d]) = self.cells.get((bits >> WITHIN_BITS) as usize) else {
             return exact_level_nm(&self.curves, speed);
         };
         let share = (bits & ((1 << WITHIN_BITS) - 1)) as f64 * (1.0 / (1_u64 << WITHIN_BITS) as f64);
-        a + share * (b + share * (c + share * d))
+        // Two short chains in place of Horner's long one: the next stage of the integrator waits for this.
+        (a + share * b) + share * share * (c + share * d)
     }
 }
 
@@ -113,7 +114,8 @@ mod tests {
         let curve = curve(1.612, 0.2310);
         let table = SlidingFriction::new([curve]);
         for speed in [1e-300, 1e-12, 2000.0, 1e6] {
-            assert_eq!(table.torque_nm(speed, 1.0), curve.torque_nm(speed), "{speed}");
+            let error = (table.torque_nm(speed, 1.0) / curve.torque_nm(speed) - 1.0).abs();
+            assert!(error < 1e-15, "{error} at {speed} rad/s");
         }
         let p = curve.parameters();
         assert_eq!(table.torque_nm(0.0, -1.0), p.offset_nm - p.static_nm);

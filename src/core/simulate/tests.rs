@@ -1,0 +1,242 @@
+//! The closed loop as a whole, on the paper's preset.
+
+use std::ops::ControlFlow;
+
+use nalgebra::Matrix2x4;
+
+use super::*;
+use crate::control::{BalanceController, ControllerKind};
+use crate::lqr;
+use crate::model_file::{Model, RobotModel};
+use crate::robot::State;
+
+fn paper() -> RobotModel {
+    let text = include_str!("../../../presets/paper.toml");
+    *Model::from_toml(text, "paper.toml").unwrap().robot().unwrap()
+}
+
+fn gain(robot: &RobotModel) -> Matrix2x4<f64> {
+    lqr::design(&robot.parameters.linear_model(), &robot.weights.unwrap()).unwrap().gain
+}
+
+fn controller(kind: ControllerKind) -> BalanceController {
+    BalanceController::new(kind, &paper(), gain(&paper())).unwrap()
+}
+
+fn run(scenario: Scenario, kind: ControllerKind, seed: u64, seconds: f64) -> Run {
+    let settings = SimulationSettings { seed, ..SimulationSettings::default() };
+    let go_on = &mut |_: &Sample| ControlFlow::Continue(());
+    scenario.run(&paper(), controller(kind), settings, seconds, go_on).unwrap()
+}
+
+/// A robot without noise, sensor steps and delay.
+fn ideal() -> SimulationSettings {
+    let sensors = SensorSettings {
+        encoder_step_rad: 0.0,
+        motor_speed_step_rad_s: 0.0,
+        motor_speed_noise_rad_s: 0.0,
+        imu_period_ticks: 1,
+        pitch_step_rad: 0.0,
+        pitch_noise_rad: 0.0,
+        pitch_rate_step_rad_s: 0.0,
+        pitch_rate_noise_rad_s: 0.0,
+    };
+    SimulationSettings { sensors, delay_ticks: 0, torque_noise_nm: 0.0, ..SimulationSettings::default() }
+}
+
+fn simulation(robot: &RobotModel, settings: SimulationSettings) -> Simulation {
+    Simulation::new(robot, controller(ControllerKind::Lqr), settings).unwrap()
+}
+
+fn range(of: &Summary) -> f64 {
+    of.max - of.min
+}
+
+#[test]
+fn lqr_hunts_without_end_and_flqr_settles_within_a_third_of_its_range() {
+    for seed in [1, 2, 3] {
+        let lqr = run(Scenario::Flat, ControllerKind::Lqr, seed, 40.0).statistics;
+        let flqr = run(Scenario::Flat, ControllerKind::Flqr, seed, 40.0).statistics;
+        assert!(!lqr.settled && !lqr.fell && flqr.settled && !flqr.fell, "seed {seed}");
+        assert!(range(&lqr.x_m) > 3.0 * range(&flqr.x_m), "seed {seed}: {lqr:?} {flqr:?}");
+    }
+}
+
+#[test]
+fn same_seed_gives_the_same_bytes_and_another_seed_others() {
+    let bytes = |seed| -> Vec<u64> {
+        let run = run(Scenario::Flat, ControllerKind::Flqr, seed, 3.0);
+        run.samples.iter().flat_map(Sample::to_row).map(f64::to_bits).collect()
+    };
+    assert_eq!(bytes(5), bytes(5));
+    assert_ne!(bytes(5), bytes(6));
+}
+
+#[test]
+fn recorded_x_is_what_encoders_and_held_imu_give() {
+    let radius = paper().parameters.wheel_radius_m;
+    let samples = run(Scenario::Flat, ControllerKind::Lqr, 1, 2.0).samples;
+    for (tick, sample) in samples.iter().enumerate() {
+        let angle = f64::midpoint(sample.motor_angle_left_rad, sample.motor_angle_right_rad);
+        let speed = f64::midpoint(sample.motor_speed_left_rad_s, sample.motor_speed_right_rad_s);
+        assert_eq!(sample.x_m, radius * (angle + sample.pitch_rad));
+        assert_eq!(sample.x_dot_m_s, radius * (speed + sample.pitch_rate_rad_s));
+        let held = &samples[tick - tick % 10];
+        assert_eq!((sample.pitch_rad, sample.pitch_rate_rad_s), (held.pitch_rad, held.pitch_rate_rad_s));
+        for (value, step_deg) in [(sample.pitch_rad, 0.01), (speed * 2.0, 1.0), (angle, 360.0 / 65536.0)] {
+            let steps = value.to_degrees() / step_deg;
+            assert!((steps - steps.round()).abs() < 1e-6, "{value} rad is {steps} steps");
+        }
+    }
+}
+
+#[test]
+fn torque_takes_effect_after_the_delay() {
+    let mut robot = paper();
+    robot.friction = [None; 2];
+    let initial = State { pitch_rad: 0.05, ..State::default() };
+    for delay_ticks in [0, 1, 7] {
+        let settings = SimulationSettings { delay_ticks, initial, ..ideal() };
+        let mut driven = simulation(&robot, settings);
+        let mut coasting = simulation(&robot, settings);
+        coasting.set_controller(BalanceController {
+            gain: Matrix2x4::zeros(),
+            ..controller(ControllerKind::Lqr)
+        });
+        let first_difference = (0..20).find(|_| {
+            driven.step();
+            coasting.step();
+            driven.state() != coasting.state()
+        });
+        assert_eq!(first_difference, Some(delay_ticks));
+    }
+}
+
+#[test]
+fn new_controller_answers_the_next_measurement() {
+    let initial = State { pitch_rad: 0.05, ..State::default() };
+    let mut live = simulation(&paper(), SimulationSettings { initial, ..ideal() });
+    assert_ne!(live.step().torque_left_nm, 0.0);
+    live.set_controller(BalanceController { gain: Matrix2x4::zeros(), ..controller(ControllerKind::Lqr) });
+    assert_eq!(live.step().torque_left_nm, 0.0);
+}
+
+#[test]
+fn push_gives_the_robot_its_impulse() {
+    let mut robot = paper();
+    robot.friction = [None; 2];
+    // Motors off; for a moment this short gravity has no say yet.
+    let mut pushed = simulation(&robot, ideal());
+    pushed.set_controller(BalanceController { gain: Matrix2x4::zeros(), ..controller(ControllerKind::Lqr) });
+    pushed.push(30.0, 0.003);
+    for _ in 0..10 {
+        pushed.step();
+    }
+    let p = robot.parameters;
+    let c = p.coefficients();
+    let state = pushed.state();
+    // Momenta along x and about the axle: M(v) q̇ = ∫ (F, F l) dt, Eqs. 4 and 5 at θ = 0.
+    let along = (c.c1 * state.x_dot_m_s + c.c2 * state.pitch_rate_rad_s) / p.wheel_radius_m;
+    let about = c.c5 * state.x_dot_m_s + c.c3 * state.pitch_rate_rad_s;
+    assert!((along / 0.09 - 1.0).abs() < 0.01, "{along} N s");
+    assert!((about / (0.09 * p.com_height_m) - 1.0).abs() < 0.01, "{about} N m s");
+}
+
+#[test]
+fn a_robot_without_control_falls_and_stays_down_with_its_clock() {
+    let initial = State { pitch_rad: 0.05, ..State::default() };
+    let mut falling = simulation(&paper(), SimulationSettings { initial, ..SimulationSettings::default() });
+    falling.set_controller(BalanceController { gain: Matrix2x4::zeros(), ..controller(ControllerKind::Lqr) });
+    let ticks = (0..5000).take_while(|_| falling.step().time_s >= 0.0 && falling.fall().is_none()).count();
+    let fall = *falling.fall().unwrap();
+    assert!(ticks < 5000 && fall.state.pitch_rad > FALL_PITCH_RAD);
+    let after = falling.step();
+    assert_eq!((after.time_s, after.torque_left_nm), (fall.time_s, 0.0));
+    assert_eq!((falling.state(), falling.time_s()), (fall.state, fall.time_s));
+}
+
+#[test]
+fn a_run_that_falls_ends_there_and_says_so() {
+    let off = BalanceController { gain: Matrix2x4::zeros(), ..controller(ControllerKind::Lqr) };
+    let go_on = &mut |_: &Sample| ControlFlow::Continue(());
+    let run = Scenario::Flat.run(&paper(), off, SimulationSettings::default(), 60.0, go_on).unwrap();
+    let fall = run.fall.unwrap();
+    assert!(run.statistics.fell && !run.statistics.settled);
+    assert!((run.samples.last().unwrap().time_s - fall.time_s).abs() < 0.0015 && fall.time_s < 10.0);
+}
+
+#[test]
+fn the_watcher_can_stop_a_run() {
+    let stop = &mut |sample: &Sample| match sample.time_s < 0.1 {
+        true => ControlFlow::Continue(()),
+        false => ControlFlow::Break(()),
+    };
+    let settings = SimulationSettings::default();
+    let run = Scenario::Flat.run(&paper(), controller(ControllerKind::Lqr), settings, 60.0, stop).unwrap();
+    assert_eq!(run.samples.len(), 101);
+}
+
+#[test]
+fn kick_moves_the_robot_at_its_time() {
+    let calm = run(Scenario::Flat, ControllerKind::Flqr, 1, 12.0).samples;
+    let kicked = run(Scenario::Kick(Push::KICK), ControllerKind::Flqr, 1, 12.0).samples;
+    assert_eq!(calm[..=8500], kicked[..=8500]);
+    let fastest = kicked[8500..].iter().map(|sample| sample.x_dot_m_s.abs()).fold(0.0, f64::max);
+    assert!(fastest > 0.1, "{fastest} m/s");
+}
+
+#[test]
+fn statistics_are_those_of_the_samples_after_15_s() {
+    let any = run(Scenario::Flat, ControllerKind::Lqr, 1, 0.001).samples[0];
+    let sample = |tick: i32| Sample {
+        // Far out before 15 s, then between 0.01 and 0.03.
+        x_m: if tick < 15_000 { 5.0 } else { 0.02 + 0.01 * f64::from((tick % 2) * 2 - 1) },
+        x_dot_m_s: 0.5,
+        pitch_rad: -0.1,
+        time_s: f64::from(tick) / 1000.0,
+        ..any
+    };
+    let samples: Vec<Sample> = (0..25_001).map(sample).collect();
+    let found = Statistics::of(&samples).unwrap();
+    let close = |a: f64, b: f64| (a - b).abs() < 1e-9;
+    assert!(close(found.x_m.min, 0.01) && close(found.x_m.max, 0.03));
+    assert!((found.x_m.mean - 0.02).abs() < 1e-5 && (found.x_m.std - 0.01).abs() < 1e-6);
+    assert!(close(found.x_dot_m_s.mean, 0.5) && close(found.x_dot_m_s.std, 0.0));
+    assert!(found.settled && !found.fell);
+    assert!(!Statistics::of(&samples[..20_000]).unwrap().settled, "5 m and 0.02 m in the last 10 s");
+    assert!(!Statistics::of(&samples[16_000..20_000]).unwrap().settled, "4 s show nothing about 10 s");
+    assert_eq!(Statistics::of(&[]), None);
+}
+
+#[test]
+fn settings_out_of_range_are_refused_by_name() {
+    let default = SimulationSettings::default();
+    let pitched = State { pitch_rad: 0.9, ..State::default() };
+    for (settings, key) in [
+        (SimulationSettings { initial: pitched, ..default }, "pitch_rad"),
+        (SimulationSettings { torque_noise_nm: f64::NAN, ..default }, "torque_noise_nm"),
+        (SimulationSettings { delay_ticks: 5000, ..default }, "delay_ticks"),
+        (SimulationSettings { substeps: 0, ..default }, "substeps"),
+    ] {
+        let refused = Simulation::new(&paper(), controller(ControllerKind::Lqr), settings).unwrap_err();
+        assert!(refused.to_string().contains(key), "{refused}");
+    }
+}
+
+#[test]
+fn small_motions_without_friction_follow_the_predicted_response() {
+    let mut robot = paper();
+    robot.friction = [None; 2];
+    let initial = State { x_m: 1e-4, pitch_rad: 1e-4, ..State::default() };
+    let mut simulation = simulation(&robot, SimulationSettings { initial, ..ideal() });
+    let predicted = predicted_response(&robot, &gain(&robot), initial, 3.0, 0.001);
+    assert_eq!(predicted.len(), 3001);
+    for (time_s, state) in &predicted {
+        assert!((simulation.time_s() - time_s).abs() < 1e-12);
+        // The controller samples at 1 kHz, the prediction is continuous.
+        let difference = (simulation.state().to_vector() - state.to_vector()).amax();
+        assert!(difference < 2e-5, "{difference} at {time_s} s");
+        simulation.step();
+    }
+    assert!(predicted_response(&robot, &gain(&robot), initial, 1.0, 0.0).is_empty());
+}
