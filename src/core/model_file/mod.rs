@@ -4,6 +4,7 @@
 //! names the file, the line, the key and the mend; an unknown key is an error, because a misspelt key that
 //! is silently dropped would leave a default in its place.
 
+pub mod presets;
 mod schema;
 
 use crate::friction::{Compensation, Stribeck};
