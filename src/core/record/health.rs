@@ -34,6 +34,21 @@ pub struct HealthFinding {
     pub mend: String,
 }
 
+impl std::fmt::Display for HealthFinding {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self.severity {
+            Severity::Info => "note: ",
+            Severity::Warning => "warning: ",
+            Severity::Error => "error: ",
+        })?;
+        if !self.column.is_empty() {
+            write!(f, "{}: ", self.column)?;
+        }
+        f.write_str(&self.problem)?;
+        if self.mend.is_empty() { Ok(()) } else { write!(f, "; {}", self.mend) }
+    }
+}
+
 /// The findings so far.
 #[derive(Default)]
 struct Findings(Vec<HealthFinding>);
