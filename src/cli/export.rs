@@ -1,0 +1,56 @@
+//! `flqr export`: what a robot's firmware or a script takes over.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use flqr_core::control::{BalanceController, ControllerKind};
+use flqr_core::export::{Controller, Format};
+use serde::Serialize;
+
+use super::output::{Failure, Output};
+use super::{gains, input};
+
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// Model file (TOML) with a [robot] and an [lqr] table
+    model: PathBuf,
+    /// Form of the export, written to standard output
+    #[arg(long, value_enum)]
+    to: Form,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Form {
+    CHeader,
+    Json,
+    Yaml,
+    Csv,
+}
+
+/// Keys of the JSON object.
+#[derive(Serialize)]
+struct Exported<'a> {
+    controller: &'a Controller,
+    text: String,
+}
+
+pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
+    let (name, robot) = input::load_robot(&arguments.model)?;
+    let design = gains::design(&arguments.model, &robot)?;
+    let kind = match robot.friction {
+        [None, None] => ControllerKind::Lqr,
+        _ => ControllerKind::Flqr,
+    };
+    let controller = BalanceController::new(kind, &robot, design.gain).map_err(Failure::from_error)?;
+    let controller = Controller::new(&name, &controller);
+    let format = match arguments.to {
+        Form::CHeader => Format::CHeader,
+        Form::Json => Format::Json,
+        Form::Yaml => Format::Yaml,
+        Form::Csv => Format::Csv,
+    };
+    let text = controller.render(format);
+    output.result(&Exported { controller: &controller, text: text.clone() }, |out| {
+        out.write_all(text.as_bytes())
+    })
+}

@@ -1,0 +1,159 @@
+//! `flqr fit`: friction and inertia from bench logs.
+
+use std::collections::BTreeMap;
+use std::io::{self, Write};
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use flqr_core::identify::{self, Bounds, Estimate, FitOptions, FitReport, FrictionPair, Method, Motor};
+use flqr_core::record::{self, ColumnMap, HealthFinding, Log, Mapping, ReadOptions};
+use serde::Serialize;
+
+use super::input;
+use super::output::{Failure, Output};
+use super::progress::Progress;
+
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// Logs (CSV): constant speeds, staircases or friction pairs give the Stribeck curve, any other motion
+    /// inertia or mass, viscous and Coulomb friction and offset
+    #[arg(required = true)]
+    logs: Vec<PathBuf>,
+    /// Model file (TOML) with what is known; without it the columns choose the rig
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
+    /// Motor of a robot model that the log belongs to
+    #[arg(long, value_enum, default_value = "left")]
+    motor: MotorName,
+    /// Swarm and polish to the optimum, or the swarm alone
+    #[arg(long, value_enum, default_value = "best")]
+    method: MethodName,
+    /// Bounds of the swarm: from the data, or the paper's Table 3 as printed
+    #[arg(long, value_enum, default_value = "data")]
+    bounds: BoundsName,
+    /// Parameters to estimate: `all`, or names as in the model file
+    #[arg(long, value_delimiter = ',', value_name = "NAME,...")]
+    estimate: Vec<String>,
+    /// A column of ours from one of the file's, as in torque_nm=current_a*0.32; repeatable
+    #[arg(long, value_name = "OURS=THEIRS[*FACTOR]")]
+    map: Vec<Mapping>,
+    /// Seed of the swarm
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum MotorName {
+    Left,
+    Right,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum MethodName {
+    Best,
+    Pso,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum BoundsName {
+    Data,
+    Paper,
+}
+
+/// Keys of the JSON object.
+#[derive(Serialize)]
+struct Fitted<'a> {
+    parameters: &'a BTreeMap<&'static str, Estimate>,
+    rmse: Quantity,
+    relative_error: f64,
+    pairs: &'a [FrictionPair],
+    iterations: usize,
+    history: &'a [f64],
+    data_health: &'a [HealthFinding],
+    warnings: &'a [String],
+}
+
+#[derive(Serialize)]
+struct Quantity {
+    value: f64,
+    unit: &'static str,
+}
+
+pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
+    let model = arguments.model.as_deref().map(input::load_model).transpose()?;
+    let map = ColumnMap::new(arguments.map.clone()).map_err(Failure::from_error)?;
+    let logs = arguments.logs.iter().map(|path| read_log(path, &map)).collect::<Result<Vec<_>, _>>()?;
+    let motor = match arguments.motor {
+        MotorName::Left => Motor::Left,
+        MotorName::Right => Motor::Right,
+    };
+    let options = FitOptions {
+        method: match arguments.method {
+            MethodName::Best => Method::Best,
+            MethodName::Pso => Method::Pso,
+        },
+        bounds: match arguments.bounds {
+            BoundsName::Data => Bounds::Data,
+            BoundsName::Paper => Bounds::Paper,
+        },
+        estimate: arguments.estimate.clone(),
+        seed: arguments.seed,
+    };
+    let bar = Progress::new("fit");
+    let report = identify::fit(&logs, model.as_ref(), motor, &options, &mut |progress| {
+        bar.set(progress.iteration as u64, progress.iterations as u64);
+        ControlFlow::Continue(())
+    })
+    .map_err(Failure::from_error)?;
+    drop(bar);
+    let keys = Fitted {
+        parameters: &report.parameters,
+        rmse: Quantity { value: report.rmse, unit: report.rmse_unit },
+        relative_error: report.relative_error,
+        pairs: &report.pairs,
+        iterations: report.iterations,
+        history: &report.history,
+        data_health: &report.data_health,
+        warnings: &report.warnings,
+    };
+    output.result(&keys, |out| print(out, &report))
+}
+
+/// Reads a log with a progress bar.
+fn read_log(path: &Path, map: &ColumnMap) -> Result<Log, Failure> {
+    let (reader, bytes) = input::open(path)?;
+    let source = path.display().to_string();
+    let bar = Progress::new(format!("reading {source}"));
+    let options = ReadOptions::new(map);
+    record::read_log(reader, &source, &options, &mut |progress| {
+        bar.set(progress.bytes, bytes);
+        ControlFlow::Continue(())
+    })
+    .map_err(Failure::from_error)
+}
+
+fn print(out: &mut dyn Write, report: &FitReport) -> io::Result<()> {
+    writeln!(out, "{:24}{:>14}   95 % interval", "parameter", "value")?;
+    for (name, estimate) in &report.parameters {
+        write!(out, "{name:24}{:>14.6}", estimate.value)?;
+        match estimate.ci95 {
+            Some([low, high]) => writeln!(out, "   {low:.6} to {high:.6}")?,
+            None => writeln!(out, "   none")?,
+        }
+    }
+    writeln!(
+        out,
+        "\nRMSE {:.6} {}, relative error {:.2} %",
+        report.rmse,
+        report.rmse_unit,
+        100.0 * report.relative_error
+    )?;
+    if !report.pairs.is_empty() {
+        writeln!(out, "{} pairs, {} iterations", report.pairs.len(), report.iterations)?;
+    }
+    for finding in &report.data_health {
+        writeln!(out, "{finding}")?;
+    }
+    report.warnings.iter().try_for_each(|warning| writeln!(out, "warning: {warning}"))
+}

@@ -1,0 +1,67 @@
+//! The command line: one file for each command, all over the same core functions as the window.
+
+mod export;
+mod fit;
+mod gains;
+mod input;
+mod output;
+mod progress;
+mod riccati;
+mod simulate;
+mod window;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+use output::{Failure, Output};
+
+/// Tunes the balance controller of a wheel-legged robot: friction-feedforward LQR, closed with measured data.
+///
+/// Without a command it opens the window. Numbers are SI, angles in rad.
+#[derive(Parser)]
+#[command(name = "flqr", version, args_conflicts_with_subcommands = true)]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+    #[command(flatten)]
+    window: window::Arguments,
+    /// Print one JSON object on standard output and nothing else there
+    #[arg(long, global = true)]
+    json: bool,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// The LQR design of a model: gain, cost, poles
+    Gains(gains::Arguments),
+    /// Solve any continuous-time algebraic Riccati equation
+    Riccati(riccati::Arguments),
+    /// Friction and inertia from bench logs
+    Fit(fit::Arguments),
+    /// Run the simulated robot
+    Simulate(simulate::Arguments),
+    /// Write what a robot's firmware or a script takes over
+    Export(export::Arguments),
+}
+
+/// Runs the command and maps its outcome to an exit code: 0 done, 1 could not be done.
+pub(crate) fn run(cli: Cli) -> ExitCode {
+    let output = Output::new(cli.json);
+    let done = match cli.command {
+        None => window::run(cli.window),
+        Some(Command::Gains(arguments)) => gains::run(&arguments, &output),
+        Some(Command::Riccati(arguments)) => riccati::run(&arguments, &output),
+        Some(Command::Fit(arguments)) => fit::run(&arguments, &output),
+        Some(Command::Simulate(arguments)) => simulate::run(&arguments, &output),
+        Some(Command::Export(arguments)) => export::run(&arguments, &output),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(Failure::ReaderGone) => ExitCode::SUCCESS,
+        Err(Failure::Message(message)) => {
+            output::complain(&message);
+            ExitCode::FAILURE
+        }
+    }
+}

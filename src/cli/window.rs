@@ -1,0 +1,61 @@
+//! Without a command: the window.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use flqr_core::model_file::presets;
+use flqr_core::record::Mapping;
+use flqr_gui::{Tab, WindowOptions};
+
+use super::input;
+use super::output::Failure;
+
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// Model file to open in the window; without it, the paper's robot
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
+    /// Log to open in the window
+    #[arg(long, value_name = "FILE")]
+    log: Option<PathBuf>,
+    /// A column of ours from one of the log's, as in torque_nm=current_a*0.32; repeatable
+    #[arg(long, value_name = "OURS=THEIRS[*FACTOR]")]
+    map: Vec<Mapping>,
+    /// Tab to begin with
+    #[arg(long, value_enum)]
+    tab: Option<TabName>,
+    /// Start with the simulated robot paused
+    #[arg(long)]
+    paused: bool,
+    /// Keep what the window shows in this file, as JSON, for scripts that drive the window
+    #[arg(long, value_name = "FILE")]
+    state_out: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum TabName {
+    Tune,
+    Friction,
+}
+
+pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
+    let model = match &arguments.model {
+        Some(path) => input::load_model(path)?,
+        None => presets::paper(),
+    };
+    let tab = match (arguments.tab, &arguments.log) {
+        (Some(TabName::Friction), _) | (None, Some(_)) => Tab::Friction,
+        (Some(TabName::Tune), _) | (None, None) => Tab::Tune,
+    };
+    let map: Vec<_> = arguments.map.iter().map(Mapping::to_string).collect();
+    let options = WindowOptions {
+        model_path: arguments.model,
+        log: arguments.log,
+        column_map: map.join(" "),
+        tab,
+        paused: arguments.paused,
+        state_out: arguments.state_out,
+        ..WindowOptions::new(model)
+    };
+    flqr_gui::run(options).map_err(Failure::from_error)
+}

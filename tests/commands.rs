@@ -1,0 +1,213 @@
+//! The program as scripts see it: arguments in; JSON, messages and exit codes out.
+
+use std::path::PathBuf;
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+const PAPER: &str = "presets/paper.toml";
+
+fn flqr(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_flqr"))
+        .args(arguments)
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .env_remove("DISPLAY")
+        .env_remove("WAYLAND_DISPLAY")
+        .output()
+        .expect("the program was built with its tests")
+}
+
+/// Runs a command that must succeed and print one JSON object and nothing else.
+fn json(arguments: &[&str]) -> Value {
+    let output = flqr(&[arguments, &["--json"]].concat());
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(0), "{arguments:?}: {message}");
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// Runs a command that must fail with `code`; gives its message, which is one line.
+fn refusal(arguments: &[&str], code: i32) -> String {
+    let output = flqr(arguments);
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(code), "{arguments:?}: {message}");
+    assert!(output.stdout.is_empty(), "{arguments:?} printed a result beside its refusal");
+    assert!(code == 2 || message.trim_end().lines().count() == 1, "{arguments:?}: {message}");
+    message
+}
+
+/// A file of this text in the tests' own folder.
+fn file(name: &str, text: &str) -> String {
+    let path = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
+    std::fs::write(&path, text).unwrap();
+    path.display().to_string()
+}
+
+fn numbers(value: &Value) -> Vec<f64> {
+    match value {
+        Value::Array(items) => items.iter().flat_map(numbers).collect(),
+        leaf => vec![leaf.as_f64().unwrap()],
+    }
+}
+
+#[test]
+fn gains_of_the_papers_preset() {
+    let gains = json(&["gains", PAPER]);
+    let shapes = [("a", 16), ("b", 8), ("k", 8), ("p", 16), ("poles", 8)];
+    for (key, count) in shapes {
+        assert_eq!(numbers(&gains[key]).len(), count, "{key}");
+    }
+    assert!(gains["riccati_residual"].as_f64().unwrap() <= 1e-13);
+    // R = ρ·1, so both motors get the same gain.
+    assert_eq!(gains["k"][0], gains["k"][1]);
+    // K = R⁻¹BᵀP (Eq. 24), recomputed from the printed matrices.
+    let (b, p) = (numbers(&gains["b"]), numbers(&gains["p"]));
+    let weight = weight_of_torque();
+    for state in 0..4 {
+        let expected = (0..4).map(|i| b[2 * i] * p[4 * i + state]).sum::<f64>() / weight;
+        let found = numbers(&gains["k"])[state];
+        assert!((found - expected).abs() <= 1e-12 * expected.abs(), "{found} for {expected}");
+    }
+    assert!(numbers(&gains["poles"]).iter().step_by(2).all(|&real| real < 0.0));
+}
+
+fn weight_of_torque() -> f64 {
+    let text = std::fs::read_to_string(PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(PAPER)).unwrap();
+    let model = flqr_core::model_file::Model::from_toml(&text, PAPER).unwrap();
+    model.robot().unwrap().weights.unwrap().r[(0, 0)]
+}
+
+#[test]
+fn riccati_of_a_double_integrator_has_its_closed_form() {
+    let weighted =
+        file("care.json", r#"{"a": [[0, 1], [0, 0]], "b": [[0], [1]], "q": [[1, 0], [0, 1]], "r": [[1]]}"#);
+    let quadratic =
+        file("care_g.json", r#"{"a": [[0, 1], [0, 0]], "g": [[0, 0], [0, 1]], "q": [[1, 0], [0, 1]]}"#);
+    let root = 3f64.sqrt();
+    for (path, has_gain) in [(weighted, true), (quadratic, false)] {
+        let solution = json(&["riccati", &path]);
+        for (found, expected) in numbers(&solution["p"]).into_iter().zip([root, 1.0, 1.0, root]) {
+            assert!((found - expected).abs() <= 2.0 * f64::EPSILON * root, "{found} for {expected}");
+        }
+        assert_eq!(solution.get("k").is_some(), has_gain);
+        assert!(solution["riccati_residual"].as_f64().unwrap() < 1e-15);
+        assert_eq!(solution["warnings"], Value::Array(vec![]));
+    }
+}
+
+#[test]
+fn riccati_refuses_what_has_no_answer() {
+    for (name, text, part) in [
+        (
+            "unstabilisable",
+            r#"{"a": [[1, 0], [0, 2]], "b": [[1], [0]], "q": [[1, 0], [0, 1]], "r": [[1]]}"#,
+            "stabilis",
+        ),
+        ("singular_r", r#"{"a": [[1]], "b": [[1]], "q": [[1]], "r": [[0]]}"#, "positive definite"),
+        ("ragged", r#"{"a": [[1, 2], [3]], "b": [[1]], "q": [[1]], "r": [[1]]}"#, "row 2"),
+        ("shape", r#"{"a": [[1]], "b": [[1], [2]], "q": [[1]], "r": [[1]]}"#, "b"),
+        ("text", r#"{"a": [["one"]], "b": [[1]], "q": [[1]], "r": [[1]]}"#, "line 1"),
+        ("both", r#"{"a": [[1]], "b": [[1]], "g": [[1]], "q": [[1]], "r": [[1]]}"#, "either"),
+        ("cut", r#"{"a": [[1]], "b": "#, "EOF"),
+    ] {
+        let message = refusal(&["riccati", &file(&format!("{name}.json"), text)], 1);
+        assert!(message.contains(part) && message.contains(name), "{message}");
+    }
+}
+
+#[test]
+fn fit_finds_the_curve_behind_pairs() {
+    let curve = flqr_core::friction::Stribeck::new(flqr_core::friction::StribeckParameters {
+        coulomb_nm: 0.0338,
+        static_nm: 0.0761,
+        viscous_nm_s_rad: 4.9e-4,
+        stribeck_speed_rad_s: 1.612,
+        stribeck_exponent: 0.2310,
+        offset_nm: -0.0016,
+    })
+    .unwrap();
+    let speeds = (0..260).map(|i| -50.0 + 100.0 * f64::from(i) / 259.0);
+    let rows: String = speeds.map(|speed| format!("{speed},{}\n", curve.torque_nm(speed))).collect();
+    let path = file("pairs.csv", &format!("speed_rad_s,torque_nm\n{rows}"));
+    let fit = json(&["fit", &path]);
+    assert!(fit["rmse"]["value"].as_f64().unwrap() < 1e-6, "{}", fit["rmse"]);
+    assert_eq!(fit["rmse"]["unit"], "N m");
+    assert_eq!(fit["pairs"].as_array().unwrap().len(), 260);
+    assert_eq!(fit["history"].as_array().unwrap().len() as u64, fit["iterations"].as_u64().unwrap());
+    assert!(fit["parameters"]["viscous_nm_s_rad"]["ci95"].is_array());
+    assert_eq!(json(&["fit", &path]), fit, "the same seed gave another answer");
+}
+
+#[test]
+fn bad_logs_are_refused_in_one_sentence() {
+    for (name, text, part) in [
+        ("empty.csv", "", "empty"),
+        ("missing.csv", "time_s,motor_angle_rad,current_a\n0,0,0\n1,1,1\n", "torque_nm"),
+        ("words.csv", "time_s,motor_angle_rad,torque_nm\n0,zero,0\n1,one,1\n2,two,1\n", "motor_angle_rad"),
+        ("nan.csv", "speed_rad_s,torque_nm\n1,nan\n2,nan\n", "torque_nm"),
+        ("back.csv", "time_s,motor_angle_rad,torque_nm\n3,0,0\n2,0,0\n1,0,0\n0,0,0\n", "time"),
+    ] {
+        let message = refusal(&["fit", &file(name, text)], 1);
+        assert!(message.contains(part) && message.contains(name), "{message}");
+    }
+    assert!(refusal(&["fit", "no_such.csv"], 1).contains("no_such.csv"));
+    assert!(refusal(&["fit", "x.csv", "--map", "torque_nm"], 2).contains("torque_nm"));
+}
+
+#[test]
+fn friction_feedforward_ends_the_hunting() {
+    let run = |controller: &str| {
+        json(&["simulate", PAPER, "--scenario", "flat", "--controller", controller, "--seconds", "60"])
+    };
+    let (lqr, flqr) = (run("lqr"), run("flqr"));
+    let range = |run: &Value| {
+        run["statistics"]["x_m"]["max"].as_f64().unwrap() - run["statistics"]["x_m"]["min"].as_f64().unwrap()
+    };
+    assert_eq!((&lqr["settled"], &flqr["settled"]), (&Value::Bool(false), &Value::Bool(true)));
+    assert_eq!((&lqr["fell"], &flqr["fell"]), (&Value::Bool(false), &Value::Bool(false)));
+    assert!(range(&lqr) >= 3.0 * range(&flqr), "{} against {}", range(&lqr), range(&flqr));
+    assert_eq!(run("lqr"), lqr, "the same seed gave another run");
+}
+
+#[test]
+fn a_simulated_run_is_a_robot_log() {
+    let path = file("run.csv", "");
+    json(&["simulate", PAPER, "--seconds", "2", "--log", &path]);
+    let text = std::fs::read_to_string(&path).unwrap();
+    let header = text.lines().next().unwrap();
+    assert!(header.starts_with("time_s,x_m,x_dot_m_s,pitch_rad,pitch_rate_rad_s"), "{header}");
+    assert_eq!(text.lines().count(), 2001);
+}
+
+#[test]
+fn exports_carry_the_gain() {
+    let gain = numbers(&json(&["gains", PAPER])["k"]);
+    for form in ["c-header", "json", "yaml", "csv"] {
+        let output = flqr(&["export", PAPER, "--to", form]);
+        let text = String::from_utf8(output.stdout).unwrap();
+        assert_eq!(output.status.code(), Some(0));
+        assert!(gain.iter().all(|entry| text.contains(&entry.to_string())), "{form}: {text}");
+    }
+}
+
+#[test]
+fn wrong_models_are_refused_with_file_and_line() {
+    let paper = std::fs::read_to_string(PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(PAPER)).unwrap();
+    let key = file("key.toml", &paper.replace("com_height_m", "com_hight_m"));
+    let line = 1 + paper.lines().position(|line| line.starts_with("com_height_m")).unwrap();
+    let message = refusal(&["gains", &key], 1);
+    assert!(message.contains(&format!("key.toml:{line}:")) && message.contains("com_hight_m"), "{message}");
+    let axis = file("axis.toml", "name = \"a\"\n[axis]\nkind = \"linear\"\nmass_kg = 1.0\n");
+    assert!(refusal(&["gains", &axis], 1).contains("[robot]"));
+    assert!(refusal(&["simulate", &axis], 1).contains("[robot]"));
+    let bare = file("bare.toml", paper.split("[lqr]").next().unwrap());
+    assert!(refusal(&["gains", &bare], 1).contains("[lqr]"));
+}
+
+#[test]
+fn wrong_usage_ends_with_2_and_no_display_with_a_sentence() {
+    for arguments in [&["gains"][..], &["no-such-command"], &["simulate", PAPER, "--seconds", "-1"]] {
+        refusal(arguments, 2);
+    }
+    let message = refusal(&[], 1);
+    assert!(message.contains("display") && message.contains("flqr simulate"), "{message}");
+}

@@ -1,0 +1,44 @@
+//! What the README says exists, exists.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::process::Command;
+
+fn readme() -> String {
+    std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md")).unwrap()
+}
+
+/// The word behind each "`flqr ", where it is a command and not a flag.
+fn commands(text: &str) -> BTreeSet<&str> {
+    text.split("`flqr ")
+        .skip(1)
+        .filter_map(|rest| rest.split([' ', '`']).next())
+        .filter(|word| !word.starts_with('-'))
+        .collect()
+}
+
+#[test]
+fn every_command_has_help() {
+    let text = readme();
+    let commands = commands(&text);
+    assert!(commands.contains("gains"), "{commands:?}");
+    for command in commands {
+        let output = Command::new(env!("CARGO_BIN_EXE_flqr")).args([command, "--help"]).output().unwrap();
+        assert!(output.status.success(), "flqr {command}: {}", String::from_utf8_lossy(&output.stderr));
+    }
+}
+
+#[test]
+fn every_preset_and_picture_is_there() {
+    let text = readme();
+    let paths: BTreeSet<&str> = text
+        .split(|c: char| c.is_whitespace() || "`()".contains(c))
+        .filter(|word| {
+            ["presets/", "assets/"].iter().any(|folder| word.starts_with(folder) && word.len() > folder.len())
+        })
+        .collect();
+    assert!(paths.contains("presets/paper.toml"), "{paths:?}");
+    for path in paths {
+        assert!(Path::new(env!("CARGO_MANIFEST_DIR")).join(path).exists(), "{path}");
+    }
+}
