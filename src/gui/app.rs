@@ -64,6 +64,7 @@ pub struct App {
     commands: Commands,
     status: Status,
     recent: Recent,
+    recent_file: Option<PathBuf>,
     recent_job: Option<Job<(), Recent>>,
     dialog: Option<Dialog>,
     model_job: Option<ModelJob>,
@@ -100,7 +101,8 @@ impl App {
             commands: Commands::default(),
             status: Status::default(),
             recent: Recent::default(),
-            recent_job: Some(Job::start("recent-files", &waker, |_| read_recent())?),
+            recent_job: read_recent(options.recent_file.clone(), &waker)?,
+            recent_file: options.recent_file,
             dialog: None,
             model_job: None,
             state_out,
@@ -204,10 +206,10 @@ impl App {
         }
     }
 
-    /// A job to run without its result, for the small files that the program keeps.
+    /// Writes the list of recent files, on a thread whose end nobody waits for.
     fn save_recent(&mut self) {
         self.recent.column_map = self.friction.column_map().to_owned();
-        let Some(path) = recent::file() else { return };
+        let Some(path) = self.recent_file.clone() else { return };
         let text = self.recent.to_json();
         // Losing the list is no reason to bother anyone.
         std::thread::Builder::new()
@@ -306,9 +308,12 @@ impl App {
     }
 }
 
-fn read_recent() -> Recent {
-    let text = recent::file().and_then(|path| std::fs::read_to_string(path).ok());
-    text.map_or_else(Recent::default, |text| Recent::from_json(&text))
+fn read_recent(file: Option<PathBuf>, waker: &Waker) -> std::io::Result<Option<Job<(), Recent>>> {
+    let read = |file: PathBuf| {
+        let text = std::fs::read_to_string(file);
+        text.map_or_else(|_| Recent::default(), |text| Recent::from_json(&text))
+    };
+    file.map(|file| Job::start("recent-files", waker, move |_| read(file))).transpose()
 }
 
 impl eframe::App for App {

@@ -55,8 +55,8 @@ fn note(list: &mut Vec<PathBuf>, path: &Path) {
     list.truncate(LONGEST_LIST);
 }
 
-/// Where the list is kept; none where the system names no folder for it.
-pub(crate) fn file() -> Option<PathBuf> {
+/// Where the list is usually kept; none where the system names no folder for it.
+pub(crate) fn default_file() -> Option<PathBuf> {
     let folder = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
     let config = if cfg!(windows) {
         folder("APPDATA")?

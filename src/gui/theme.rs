@@ -1,6 +1,9 @@
 //! Colours and spacing, for a light and a dark window.
 
-use egui::{Color32, Context, CornerRadius, FontFamily, FontId, Stroke, TextStyle, Theme, Visuals, vec2};
+use egui::{
+    Color32, Context, CornerRadius, FontDefinitions, FontFamily, FontId, Stroke, TextStyle, Theme, Visuals,
+    vec2,
+};
 
 /// Colours with a meaning.
 #[derive(Clone, Copy, Debug)]
@@ -49,6 +52,7 @@ pub(crate) fn palette(visuals: &Visuals) -> Palette {
 
 /// Gives both themes their look.
 pub(crate) fn apply(ctx: &Context) {
+    ctx.set_fonts(fonts());
     ctx.set_visuals_of(Theme::Dark, dark());
     ctx.set_visuals_of(Theme::Light, light());
     ctx.all_styles_mut(|style| {
@@ -63,6 +67,19 @@ pub(crate) fn apply(ctx: &Context) {
         style.text_styles.insert(TextStyle::Small, FontId::new(11.5, FontFamily::Proportional));
         style.text_styles.insert(TextStyle::Monospace, FontId::new(12.0, FontFamily::Monospace));
     });
+}
+
+/// The default fonts, with the monospace one as a second source of signs: messages carry arrows and Greek.
+fn fonts() -> FontDefinitions {
+    let mut fonts = FontDefinitions::default();
+    let others = fonts.families.get(&FontFamily::Monospace).cloned().unwrap_or_default();
+    let proportional = fonts.families.entry(FontFamily::Proportional).or_default();
+    for font in others {
+        if !proportional.contains(&font) {
+            proportional.push(font);
+        }
+    }
+    fonts
 }
 
 fn dark() -> Visuals {

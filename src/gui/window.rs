@@ -23,6 +23,8 @@ pub struct WindowOptions {
     pub paused: bool,
     /// A file that always holds what the window shows, as JSON.
     pub state_out: Option<PathBuf>,
+    /// Where the list of recent files is kept; without one it is not kept.
+    pub recent_file: Option<PathBuf>,
 }
 
 impl WindowOptions {
@@ -36,6 +38,7 @@ impl WindowOptions {
             tab: Tab::Tune,
             paused: false,
             state_out: None,
+            recent_file: crate::recent::default_file(),
         }
     }
 }
@@ -90,7 +93,7 @@ pub fn run(options: WindowOptions) -> Result<(), WindowError> {
     let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| open(options, &opening)));
     match result {
         Ok(Ok(())) => Ok(()),
-        Ok(Err(error)) => Err(WindowError::NoDisplay { reason: one_line(&error.to_string()) }),
+        Ok(Err(error)) => Err(WindowError::NoDisplay { reason: last_cause(&error.to_string()) }),
         Err(payload) if opening.load(std::sync::atomic::Ordering::Relaxed) => {
             Err(WindowError::MissingLibrary { reason: one_line(panic_text(&*payload)) })
         }
@@ -152,6 +155,12 @@ fn check_display() -> Result<(), WindowError> {
     Ok(())
 }
 
+/// The window library puts its source files before what the system said.
+fn last_cause(text: &str) -> String {
+    let line = one_line(text);
+    line.rsplit(": ").next().unwrap_or_default().to_owned()
+}
+
 fn one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
@@ -167,6 +176,12 @@ fn panic_text(payload: &(dyn std::any::Any + Send)) -> &str {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_reason_is_what_the_system_said() {
+        let text = "winit EventLoopError: os error at a/b.rs:788: Failed to open connection to X server";
+        assert_eq!(last_cause(text), "Failed to open connection to X server");
+    }
 
     #[test]
     fn an_error_names_the_commands_that_work_and_the_packages() {

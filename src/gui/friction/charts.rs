@@ -99,6 +99,6 @@ fn convergence_plot(fit: &FitRun, ui: &mut Ui, size: egui::Vec2) {
     });
     plot.show(ui, |plot_ui| {
         let points = PlotPoints::from(fit.convergence.clone());
-        plot_ui.line(Line::new("best error", points).color(color).width(1.8));
+        plot_ui.line(Line::new("best error", points).color(color).width(1.8).allow_band(false));
     });
 }

@@ -1,5 +1,7 @@
 //! The window without a window: every page driven by the names that a screen reader would use.
 
+#![expect(clippy::unwrap_used, reason = "helpers of tests, where a panic is the report")]
+
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -17,7 +19,7 @@ type Window = Harness<'static, Option<App>>;
 
 fn options(tab: Tab) -> WindowOptions {
     let model = Model::from_toml(PAPER, "presets/paper.toml").unwrap();
-    WindowOptions { tab, paused: true, ..WindowOptions::new(model) }
+    WindowOptions { tab, paused: true, recent_file: None, ..WindowOptions::new(model) }
 }
 
 fn open(options: WindowOptions, size: Vec2) -> Window {

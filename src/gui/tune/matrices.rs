@@ -2,6 +2,7 @@
 
 use egui::Ui;
 use flqr_core::lqr::Weights;
+use nalgebra::SMatrix;
 
 use crate::command::Command;
 use crate::context::ViewContext;
@@ -13,28 +14,25 @@ const MOTORS: [&str; 2] = ["left", "right"];
 /// Edits both matrices; they stay symmetric by construction.
 pub(super) fn matrices_ui(context: &ViewContext<'_>, ui: &mut Ui, weights: &mut Weights) {
     hint_ui(ui, "Q in SI units, symmetric: one entry changes its mirror image too");
-    egui::Grid::new("q").spacing([4.0, 4.0]).show(ui, |ui| {
-        for row in 0..4 {
-            for column in 0..4 {
-                let name = format!("Q {}, {}", STATES[row], STATES[column]);
-                let mut value = weights.q[(row, column)];
-                if entry_ui(context, ui, &mut value, &name) {
-                    weights.q[(row, column)] = value;
-                    weights.q[(column, row)] = value;
-                }
-            }
-            ui.end_row();
-        }
-    });
+    symmetric_ui(context, ui, "Q", STATES, &mut weights.q);
     hint_ui(ui, "R, 1/(N m)²");
-    egui::Grid::new("r").spacing([4.0, 4.0]).show(ui, |ui| {
-        for row in 0..2 {
-            for column in 0..2 {
-                let name = format!("R {}, {}", MOTORS[row], MOTORS[column]);
-                let mut value = weights.r[(row, column)];
-                if entry_ui(context, ui, &mut value, &name) {
-                    weights.r[(row, column)] = value;
-                    weights.r[(column, row)] = value;
+    symmetric_ui(context, ui, "R", MOTORS, &mut weights.r);
+}
+
+fn symmetric_ui<const N: usize>(
+    context: &ViewContext<'_>,
+    ui: &mut Ui,
+    letter: &str,
+    names: [&str; N],
+    matrix: &mut SMatrix<f64, N, N>,
+) {
+    egui::Grid::new(letter).spacing([4.0, 4.0]).show(ui, |ui| {
+        for (row, row_name) in names.iter().enumerate() {
+            for (column, column_name) in names.iter().enumerate() {
+                let mut value = matrix[(row, column)];
+                if entry_ui(context, ui, &mut value, &format!("{letter} {row_name}, {column_name}")) {
+                    matrix[(row, column)] = value;
+                    matrix[(column, row)] = value;
                 }
             }
             ui.end_row();
