@@ -8,14 +8,14 @@ use super::square::Square;
 /// Sweeps over the states; three or four are usual.
 const SWEEPS: usize = 30;
 /// A state's unit changes where the sizes differ by more than this power of two.
-const WORTHWHILE: f64 = 2.0;
+const WORTHWHILE: i32 = 2;
 /// Largest exponent of a unit, far from overflow of products of three.
-const LARGEST_EXPONENT: f64 = 200.0;
+const LARGEST_EXPONENT: i32 = 200;
 
 /// D, diagonal, such that x = D z has a balanced equation.
 pub(super) fn units<M: Square>(equation: &Riccati<M>) -> Vec<f64> {
     let size = equation.a.size();
-    let mut exponents = vec![0.0_f64; size];
+    let mut exponents = vec![0_i32; size];
     for _ in 0..SWEEPS {
         let mut changed = false;
         for state in 0..size {
@@ -24,8 +24,9 @@ pub(super) fn units<M: Square>(equation: &Riccati<M>) -> Vec<f64> {
                 continue;
             }
             // One unit larger by 2ᵉ: input sizes shrink and output sizes grow by that factor.
-            let exponent = (0.5 * (input / output).log2()).round();
-            let bounded = (exponents[state] + exponent).clamp(-LARGEST_EXPONENT, LARGEST_EXPONENT);
+            let exponent = (0.5 * (input / output).log2()).round() as i32;
+            let bounded =
+                exponents[state].saturating_add(exponent).clamp(-LARGEST_EXPONENT, LARGEST_EXPONENT);
             if exponent.abs() >= WORTHWHILE && bounded != exponents[state] {
                 exponents[state] = bounded;
                 changed = true;
@@ -35,15 +36,20 @@ pub(super) fn units<M: Square>(equation: &Riccati<M>) -> Vec<f64> {
             break;
         }
     }
-    exponents.into_iter().map(f64::exp2).collect()
+    exponents.into_iter().map(power_of_two).collect()
+}
+
+/// Exact, which the library's `exp2` need not be.
+fn power_of_two(exponent: i32) -> f64 {
+    2.0_f64.powi(exponent)
 }
 
 /// Sizes of what drives `state` (its rows of A and G) and of what it drives (its columns of A and Q).
-fn sizes<M: Square>(equation: &Riccati<M>, exponents: &[f64], state: usize) -> (f64, f64) {
+fn sizes<M: Square>(equation: &Riccati<M>, exponents: &[i32], state: usize) -> (f64, f64) {
     let (mut input, mut output) = (0.0, 0.0);
     for (other, other_exponent) in exponents.iter().enumerate() {
-        let ratio = (other_exponent - exponents[state]).exp2();
-        let product = (other_exponent + exponents[state]).exp2();
+        let ratio = power_of_two(other_exponent - exponents[state]);
+        let product = power_of_two(other_exponent + exponents[state]);
         let size = |entry: M::Scalar, unit: f64| entry.abs().to_f64() * unit;
         input += size(equation.g.at(state, other), 1.0 / product);
         output += size(equation.q.at(state, other), product);
