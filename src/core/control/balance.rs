@@ -81,10 +81,12 @@ impl BalanceController {
     /// speed (Eq. 29), within the limit.
     pub fn step(&self, measurement: &Measurement) -> [f64; 2] {
         let feedback: Vector2<f64> = -(self.gain * measurement.state.to_vector());
+        // A limit below zero or not a number switches the motors off.
+        let limit = self.torque_limit_nm.max(0.0);
         std::array::from_fn(|motor| {
             let friction = self.feedforward[motor]
                 .map_or(0.0, |feedforward| feedforward.torque_nm(measurement.motor_speed_rad_s[motor]));
-            (feedback[motor] + friction).clamp(-self.torque_limit_nm, self.torque_limit_nm)
+            (feedback[motor] + friction).clamp(-limit, limit)
         })
     }
 }

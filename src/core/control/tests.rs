@@ -58,6 +58,10 @@ fn torque_stays_within_the_limit_of_the_model() {
     let mut fallen = measurement();
     fallen.state.pitch_rad = -1.0;
     assert_eq!(controller.step(&fallen), [-0.05, -0.05]);
+    for broken in [-1.0, f64::NAN] {
+        let off = BalanceController { torque_limit_nm: broken, ..controller };
+        assert_eq!(off.step(&fallen).map(f64::abs), [0.0, 0.0]);
+    }
 }
 
 #[test]
