@@ -5,8 +5,8 @@ use super::parameters::{KEYS, OFFSET, Point, STATIC};
 use super::search_box::one_direction;
 use super::{Bounds, FrictionPair, SearchBox};
 
-/// Above this condition number of scaled JᵀJ, parameters trade off against each other.
-const ILL_CONDITIONED: f64 = 1e5;
+/// Above this condition number of scaled JᵀJ parameters trade off against each other; a well-posed curve has 20.
+const ILL_CONDITIONED: f64 = 1e3;
 /// Distinct speeds below which six parameters are hardly more than an interpolation.
 const FEW_SPEEDS: usize = 7;
 /// The Stribeck effect shows below this speed, rad/s.
