@@ -3,23 +3,28 @@
 use egui::{Ui, vec2};
 use egui_plot::{Legend, Line, LineStyle, MarkerShape, Plot, PlotPoints, Points};
 use flqr_core::friction::Stribeck;
+use flqr_core::record::LogKind;
 
 use super::fit::FitRun;
 use crate::context::ViewContext;
 use crate::plot::Axes;
 use crate::theme::palette;
-use crate::widgets::section_ui;
+use crate::widgets::{hint_ui, section_ui};
 
 /// The curve is drawn over ± this where there are no pairs, rad/s.
 const DEFAULT_SPEED_RAD_S: f64 = 50.0;
 const POINTS_PER_SIDE: usize = 300;
 
-pub(super) fn ui(context: &ViewContext<'_>, fit: &FitRun, ui: &mut Ui) {
-    section_ui(ui, "Fitted", |_| {});
+pub(super) fn ui(context: &ViewContext<'_>, fit: &FitRun, kind: Option<LogKind>, ui: &mut Ui) {
+    section_ui(ui, "Fitted", |ui| {
+        if fit.report.as_ref().is_some_and(|report| report.pairs.is_empty()) {
+            hint_ui(ui, "a fit from motion has no pairs of speed and torque to show");
+        }
+    });
     let height = ui.available_height();
     let width = ui.available_width() - ui.spacing().item_spacing.x;
     ui.horizontal_top(|ui| {
-        curve_plot(context, fit, ui, vec2(0.62 * width, height));
+        curve_plot(context, fit, kind, ui, vec2(0.62 * width, height));
         convergence_plot(fit, ui, vec2(0.38 * width, height));
     });
 }
@@ -31,7 +36,9 @@ fn chart<'a>(ui: &Ui, size: egui::Vec2, x_label: &'a str, y_label: &'a str) -> P
         .on(plot, ui.visuals())
 }
 
-fn curve_plot(context: &ViewContext<'_>, fit: &FitRun, ui: &mut Ui, size: egui::Vec2) {
+fn curve_plot(context: &ViewContext<'_>, fit: &FitRun, kind: Option<LogKind>, ui: &mut Ui, size: egui::Vec2) {
+    // The curve of a motor says nothing about a log of a linear axis.
+    let in_model = context.session.friction(fit.motor_index()).filter(|_| kind != Some(LogKind::LinearAxis));
     let colors = palette(ui.visuals());
     let pairs: Vec<[f64; 2]> = fit
         .report
@@ -60,7 +67,7 @@ fn curve_plot(context: &ViewContext<'_>, fit: &FitRun, ui: &mut Ui, size: egui::
             let points = Points::new("measured pairs", PlotPoints::from(pairs));
             plot_ui.points(points.color(colors.measured).shape(MarkerShape::Circle).radius(1.8));
         }
-        if let Some(curve) = context.session.friction(fit.motor_index()) {
+        if let Some(curve) = in_model {
             for (side, points) in sides(&curve, reach).into_iter().enumerate() {
                 let line = Line::new("in the model", points).id(("model", side)).color(colors.reference);
                 plot_ui.line(line.style(LineStyle::dashed_loose()).width(1.4));

@@ -5,7 +5,8 @@ use std::sync::Arc;
 use egui::{ProgressBar, RichText, TextEdit, Ui};
 use flqr_core::friction::{Stribeck, StribeckParameters};
 use flqr_core::identify::{Bounds, FitOptions, FitProgress, FitReport, Method, Motor, fit};
-use flqr_core::model_file::Model;
+use flqr_core::model_file::{AxisModel, Model, Rig};
+use flqr_core::record::LogKind;
 
 use super::load::LoadedLog;
 use crate::command::Command;
@@ -54,6 +55,12 @@ impl Default for FitRun {
     }
 }
 
+/// The session's model where it describes what the log records; a log of something else is fitted without.
+fn fitting_model(kind: Option<LogKind>, model: Model) -> Option<Model> {
+    let linear_model = matches!(model.rig, Rig::Axis(AxisModel::Linear { .. }));
+    (linear_model == (kind == Some(LogKind::LinearAxis))).then_some(model)
+}
+
 impl FitRun {
     pub(super) fn is_running(&self) -> bool {
         self.job.is_some()
@@ -62,6 +69,7 @@ impl FitRun {
     pub(super) fn start(&mut self, loaded: &LoadedLog, model: Model, waker: &Waker) -> Result<(), String> {
         self.discard();
         let log = Arc::clone(&loaded.log);
+        let model = fitting_model(loaded.kind.as_ref().ok().copied(), model);
         let motor = self.motor;
         let options = FitOptions {
             method: self.method,
@@ -78,7 +86,7 @@ impl FitRun {
                     best: progress.best,
                 })
             };
-            fit(std::slice::from_ref(&*log), Some(&model), motor, &options, &mut watch)
+            fit(std::slice::from_ref(&*log), model.as_ref(), motor, &options, &mut watch)
                 .map_err(|error| error.to_string())
         };
         self.job = Some(Job::start("fit", waker, work).map_err(|e| format!("No thread for the fit: {e}."))?);

@@ -132,7 +132,8 @@ impl FrictionTab {
                 ui.set_min_height(half);
                 self.preview.ui(&self.loader, ui);
             });
-            charts::ui(context, &self.fit, ui);
+            let kind = self.loader.log().and_then(|loaded| loaded.kind.as_ref().ok().copied());
+            charts::ui(context, &self.fit, kind, ui);
         });
     }
 }

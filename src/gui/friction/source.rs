@@ -125,7 +125,8 @@ pub(super) fn health_ui(loader: &Loader, ui: &mut Ui) {
     if let Err(problem) = &loaded.kind {
         error_ui(ui, problem);
     }
-    if loaded.health.is_empty() && loaded.kind.is_ok() && loaded.log.problem_count == 0 {
+    let harmless = loaded.health.iter().all(|finding| finding.severity == Severity::Info);
+    if harmless && loaded.kind.is_ok() && loaded.log.problem_count == 0 {
         ui.label(RichText::new("nothing wrong was found").small().color(colors.good));
     }
     line_problems_ui(loaded, ui);
@@ -142,7 +143,9 @@ pub(super) fn health_ui(loader: &Loader, ui: &mut Ui) {
                 ui.label(RichText::new(&finding.column).small().monospace());
             }
             ui.label(RichText::new(&finding.problem).small());
-            ui.label(RichText::new(format!("→ {}", finding.mend)).small().weak());
+            if !finding.mend.is_empty() {
+                ui.label(RichText::new(format!("→ {}", finding.mend)).small().weak());
+            }
         });
     }
 }

@@ -224,6 +224,29 @@ fn a_log_is_loaded_by_path_fitted_and_used() {
 }
 
 #[test]
+fn a_log_of_a_linear_axis_is_fitted_although_the_model_is_a_robot() {
+    let mut csv = String::from("time_s,position_m,force_n\n");
+    for index in 0..6000 {
+        let time = f64::from(index) * 1e-3;
+        let (mut position, mut velocity, mut acceleration) = (0.0, 0.0, 0.0);
+        for (amplitude, rate) in [(0.1_f64, 3.0_f64), (0.03, 7.3)] {
+            position += amplitude * (rate * time).sin();
+            velocity += amplitude * rate * (rate * time).cos();
+            acceleration -= amplitude * rate * rate * (rate * time).sin();
+        }
+        let force = 20.0 * acceleration + 50.0 * velocity + 5.0 * velocity.signum() + 1.0;
+        csv += &format!("{time:.3},{position:.9},{force:.6}\n");
+    }
+    let log = TempFile::new("axis.csv", &csv);
+    let mut window = open(WindowOptions { log: Some(log.0.clone()), ..options(Tab::Friction) }, SIZE);
+    until(&mut window, "loading", |s| s["friction_tab"]["log"]["kind"] == "linear_axis");
+    click(&mut window, "Start fit");
+    let ended = until(&mut window, "the fit", |s| s["friction_tab"]["fit"]["running"] == false);
+    let mass = ended["friction_tab"]["fit"]["parameters"]["mass_kg"]["value"].as_f64();
+    assert!(mass.is_some_and(|mass| (mass - 20.0).abs() < 0.4), "{ended:#}");
+}
+
+#[test]
 fn a_fit_can_be_cancelled() {
     let log = TempFile::new("cancel.csv", &pairs_csv());
     let mut window = open(WindowOptions { log: Some(log.0.clone()), ..options(Tab::Friction) }, SIZE);
