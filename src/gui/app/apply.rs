@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use egui::Context;
-use flqr_core::model_file::{AxisModel, Model, Rig};
+use flqr_core::model_file::{AxisModel, Model, Rig, presets};
 
 use super::{App, ModelJob, Tab};
 use crate::command::{Command, FilePurpose, Source, Target};
@@ -11,7 +11,6 @@ use crate::dialog::Dialog;
 use crate::job::{Job, Outcome};
 use crate::live::LiveCommand;
 use crate::session::Session;
-use crate::tune::PRESETS;
 
 /// A model file larger than this is none.
 const LARGEST_MODEL_BYTES: u64 = 1 << 20;
@@ -153,7 +152,7 @@ impl App {
     }
 
     fn load_preset(&mut self, number: usize) {
-        let Some((name, text)) = PRESETS.get(number) else { return };
+        let Some((name, text)) = presets::ALL.get(number) else { return };
         match Model::from_toml(text, name) {
             Ok(model) => self.open_model(model, None),
             Err(error) => self.fail(error.to_string()),

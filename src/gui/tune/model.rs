@@ -3,14 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use egui::{TextEdit, Ui};
+use flqr_core::model_file::presets;
 
 use crate::command::{Command, FilePurpose};
 use crate::context::ViewContext;
 use crate::widgets::{error_ui, section_ui};
-
-/// The presets that come with the program: name and text.
-pub(crate) const PRESETS: &[(&str, &str)] =
-    &[("presets/paper.toml", include_str!("../../../presets/paper.toml"))];
 
 /// State of the file controls.
 pub(super) struct ModelFiles {
@@ -27,7 +24,7 @@ impl ModelFiles {
         section_ui(ui, "Model", |ui| {
             ui.menu_button("Recent", |ui| self.recent_ui(context, ui));
             ui.menu_button("Presets", |ui| {
-                for (number, (name, _)) in PRESETS.iter().enumerate() {
+                for (number, (name, _)) in presets::ALL.iter().enumerate() {
                     if ui.button(*name).clicked() {
                         context.commands.send(Command::LoadPreset(number));
                         ui.close();
