@@ -11,14 +11,34 @@ use flqr_core::model_file::Model;
 use flqr_gui::{App, Tab, WindowOptions};
 use serde_json::Value;
 
-const PAPER: &str = include_str!("../../../presets/paper.toml");
+/// A robot with weights of its own, so that these tests don't depend on what a preset chooses.
+const ROBOT: &str = r#"
+name = "Test robot"
+[robot]
+body_mass_kg = 13.0
+wheel_mass_kg = 1.0
+wheel_inertia_kg_m2 = 0.005
+wheel_radius_m = 0.1
+com_height_m = 0.25
+body_inertia_kg_m2 = 0.25
+[friction.left]
+coulomb_nm = 0.0338
+static_nm = 0.0761
+viscous_nm_s_rad = 0.00049
+stribeck_speed_rad_s = 1.612
+stribeck_exponent = 0.231
+offset_nm = -0.0016
+[lqr]
+q_diagonal = [60.0, 30.0, 100.0, 5.0]
+r_diagonal = [20.0, 20.0]
+"#;
 const SIZE: Vec2 = vec2(1280.0, 800.0);
 
 /// The app is made in the first frame, because it needs the context.
 type Window = Harness<'static, Option<App>>;
 
 fn options(tab: Tab) -> WindowOptions {
-    let model = Model::from_toml(PAPER, "presets/paper.toml").unwrap();
+    let model = Model::from_toml(ROBOT, "test.toml").unwrap();
     WindowOptions { tab, paused: true, recent_file: None, ..WindowOptions::new(model) }
 }
 
@@ -122,7 +142,7 @@ fn a_drag_of_a_slider_changes_the_gains_while_it_lasts() {
     let mut window = open(options(Tab::Tune), SIZE);
     let before = state(&window);
     let slider = window.get_by_label("pitch weight slider").rect();
-    let (from, to) = (slider.center(), slider.center() + vec2(20.0, 0.0));
+    let (from, to) = (slider.center(), slider.center() + vec2(35.0, 0.0));
     window.drag_at(from);
     window.step();
     window.hover_at(to);

@@ -22,7 +22,6 @@ use parameters::ParameterEditor;
 use predicted::Predicted;
 use weights::WeightEditor;
 
-
 /// State of the page that is no part of the session.
 pub(crate) struct TuneTab {
     weights: WeightEditor,

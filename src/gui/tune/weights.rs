@@ -17,6 +17,10 @@ struct Row {
     help: &'static str,
 }
 
+/// Range of the sliders; fields take any number.
+const SMALLEST: f64 = 1e-4;
+const LARGEST: f64 = 1e4;
+
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
 const Q_ROWS: [Row; 4] = [
@@ -104,9 +108,9 @@ fn link(weights: &mut Weights, old: [f64; 2]) {
 
 fn row_ui(context: &ViewContext<'_>, ui: &mut Ui, row: &Row, weight: &mut f64, focus: bool) {
     ui.label(row.name).on_hover_text(row.help);
-    let slider = Slider::new(weight, 1e-2..=1e4)
+    let slider = Slider::new(weight, SMALLEST..=LARGEST)
         .logarithmic(true)
-        .smallest_positive(1e-2)
+        .smallest_positive(SMALLEST)
         .clamping(SliderClamping::Never)
         .show_value(false);
     let slider = ui.add(slider).accessible_name(format!("{} weight slider", row.name));
