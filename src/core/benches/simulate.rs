@@ -22,8 +22,8 @@ fn paper() -> RobotModel {
     *Model::from_toml(text, "paper.toml").expect("the preset loads").robot().expect("it is a robot")
 }
 
-/// 1000 ticks of the plant under state feedback, with ten substeps.
-#[divan::bench(args = [5, 10])]
+/// 1000 ticks of the plant under state feedback, by substeps.
+#[divan::bench(args = [4, 10])]
 fn plant(bencher: Bencher, substeps: u32) {
     let robot = paper();
     let gain = gain(&robot);

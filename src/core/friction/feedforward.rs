@@ -52,7 +52,7 @@ impl Feedforward {
     /// ratio · (f_s / smoothing speed + f_v).
     pub fn torque_nm(&self, motor_speed_rad_s: f64) -> f64 {
         let p = self.curve.parameters();
-        let direction = (motor_speed_rad_s / self.compensation.smoothing_speed_rad_s).tanh();
+        let direction = libm::tanh(motor_speed_rad_s / self.compensation.smoothing_speed_rad_s);
         let friction = self.curve.level_nm(motor_speed_rad_s) * direction
             + p.viscous_nm_s_rad * motor_speed_rad_s
             + p.offset_nm;

@@ -61,7 +61,8 @@ impl Stribeck {
     /// f_c + (f_s − f_c) exp(−(|q̇|/v_s)^ξ), N m: Eq. 28 without direction, viscous part and offset.
     pub fn level_nm(&self, motor_speed_rad_s: f64) -> f64 {
         let p = &self.parameters;
-        let fading = (-(motor_speed_rad_s.abs() / p.stribeck_speed_rad_s).powf(p.stribeck_exponent)).exp();
+        let ratio = motor_speed_rad_s.abs() / p.stribeck_speed_rad_s;
+        let fading = libm::exp(-libm::pow(ratio, p.stribeck_exponent));
         p.coulomb_nm + (p.static_nm - p.coulomb_nm) * fading
     }
 
@@ -74,8 +75,8 @@ impl Stribeck {
         }
         let ratio = motor_speed_rad_s.abs() / p.stribeck_speed_rad_s;
         let exponent = p.stribeck_exponent;
-        let steepness = exponent * ratio.powf(exponent - 1.0) / p.stribeck_speed_rad_s;
-        p.viscous_nm_s_rad - drop * (-ratio.powf(exponent)).exp() * steepness
+        let steepness = exponent * libm::pow(ratio, exponent - 1.0) / p.stribeck_speed_rad_s;
+        p.viscous_nm_s_rad - drop * libm::exp(-libm::pow(ratio, exponent)) * steepness
     }
 
     /// The torques that hold a resting shaft, N m: [f_p − f_s, f_p + f_s].

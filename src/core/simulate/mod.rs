@@ -1,4 +1,8 @@
 //! The simulated robot: a plant with sticking friction, the paper's sensors, and its experiments.
+//!
+//! Sine, exponential and the like come from `libm`, not from the system, whose last bit differs between
+//! processors: sticking, rounding sensors and an unstable body would make another path of it within
+//! seconds, and a run is to be the same everywhere.
 
 mod near_angle;
 mod noise;

@@ -13,7 +13,7 @@ pub(super) struct NearAngle {
 
 impl NearAngle {
     pub(super) fn new(angle: f64) -> Self {
-        let (sin, cos) = angle.sin_cos();
+        let (sin, cos) = libm::sincos(angle);
         Self { angle, sin, cos }
     }
 
@@ -22,7 +22,7 @@ impl NearAngle {
     pub(super) fn sin_cos(&self, angle: f64) -> (f64, f64) {
         let turn = angle - self.angle;
         if turn.abs() > REACH_RAD || turn.is_nan() {
-            return angle.sin_cos();
+            return libm::sincos(angle);
         }
         let square = turn * turn;
         let sin = turn * (1.0 - square * (1.0 / 6.0 - square * (1.0 / 120.0 - square / 5040.0)));

@@ -26,8 +26,8 @@ impl Noise {
         }
         let standard = self.spare.take().unwrap_or_else(|| {
             // In (0, 1], so that the logarithm is finite.
-            let radius = (-2.0 * (1.0 - self.uniform()).ln()).sqrt();
-            let (sin, cos) = (std::f64::consts::TAU * self.uniform()).sin_cos();
+            let radius = (-2.0 * libm::log(1.0 - self.uniform())).sqrt();
+            let (sin, cos) = libm::sincos(std::f64::consts::TAU * self.uniform());
             self.spare = Some(radius * sin);
             radius * cos
         });

@@ -37,7 +37,7 @@ pub struct SimulationSettings {
     /// Standard deviation of each motor's torque about the asked one, new at every tick, N m. Default:
     /// 0.02 (assumed: ripple and current control, under 1 % of the paper's motors' rated 2.42 N m).
     pub torque_noise_nm: f64,
-    /// Integration steps a tick. Default: 5, 0.2 ms each; four times as many change the path by less than
+    /// Integration steps a tick. Default: 4, 0.25 ms each; four times as many change the path by less than
     /// 5e-6 in SI units over 3 s with many stops.
     pub substeps: u32,
 }
@@ -50,7 +50,7 @@ impl Default for SimulationSettings {
             sensors: SensorSettings::default(),
             delay_ticks: 4,
             torque_noise_nm: 0.02,
-            substeps: 5,
+            substeps: 4,
         }
     }
 }
