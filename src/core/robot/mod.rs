@@ -142,11 +142,12 @@ impl Coefficients {
         along_nm: f64,
         about_nm: f64,
     ) -> Accelerations {
-        let Self { c1, c2, c3, c4, c5, .. } = *self;
+        let Self { c1, c2, c3, c4, c5, determinant } = *self;
         // c1 ẍ + c2 cos θ θ̈ = along, c5 cos θ ẍ + c3 θ̈ = about
         let along = along_nm + c2 * pitch_rate_rad_s * pitch_rate_rad_s * sin;
         let about = about_nm + c4 * sin;
-        let inverse = 1.0 / (c1 * c3 - c2 * c5 * cos * cos);
+        // c1 c3 − c2 c5 cos² θ, without its cancellation when upright
+        let inverse = 1.0 / (determinant + c2 * c5 * (1.0 - cos) * (1.0 + cos));
         Accelerations {
             x_ddot_m_s2: (c3 * along - c2 * cos * about) * inverse,
             pitch_accel_rad_s2: (c1 * about - c5 * cos * along) * inverse,
@@ -170,13 +171,15 @@ impl RobotParameters {
     pub fn coefficients(&self) -> Coefficients {
         let (body, radius, height) = (self.body_mass_kg, self.wheel_radius_m, self.com_height_m);
         let radius_squared = radius * radius;
-        let c1 =
-            (2.0 * self.wheel_inertia_kg_m2 + (2.0 * self.wheel_mass_kg + body) * radius_squared) / radius;
+        let rolling = 2.0 * self.wheel_inertia_kg_m2 + 2.0 * self.wheel_mass_kg * radius_squared;
+        let c1 = (rolling + body * radius_squared) / radius;
         let c2 = body * radius * height;
         let c3 = self.body_inertia_kg_m2 + body * height * height;
         let c4 = body * self.gravity_m_s2 * height;
         let c5 = body * height;
-        Coefficients { c1, c2, c3, c4, c5, determinant: c1 * c3 - c2 * c5 }
+        // The same as c1 c3 − c2 c5, whose two products nearly cancel where the inertias are small.
+        let determinant = (rolling * c3 + body * radius_squared * self.body_inertia_kg_m2) / radius;
+        Coefficients { c1, c2, c3, c4, c5, determinant }
     }
 
     /// A and B of Ẋ = A X + B u (Eqs. 11, 12).
@@ -292,6 +295,20 @@ mod tests {
         let change = (ROBOT.energy_j(&moved(1.0)) - ROBOT.energy_j(&moved(-1.0))) / (2.0 * step);
         let power = torque * ROBOT.motor_speed_rad_s(&state);
         assert!((change - power).abs() < 1e-7, "{change} {power}");
+    }
+
+    #[test]
+    fn determinant_keeps_its_digits_where_the_inertias_are_tiny() {
+        let tiny = RobotParameters {
+            wheel_mass_kg: 1e-12,
+            wheel_inertia_kg_m2: 1e-14,
+            body_inertia_kg_m2: 1e-12,
+            ..ROBOT
+        };
+        // [(2I + 2m r²)(J + M l²) + M r² J]/r in exact rationals: c1 c3 − c2 c5 in doubles has none of them right.
+        let exact = 1.6250000000004001e-12;
+        let found = tiny.coefficients().determinant;
+        assert!((found / exact - 1.0).abs() < 1e-14, "{found} for {exact}");
     }
 
     #[test]

@@ -1,5 +1,5 @@
-//! Friction of turning shafts, tabulated: Eq. 28 costs two powers and two exponentials at each of the
-//! 40 evaluations of a tick, which would be most of the simulation's time.
+//! Friction of turning shafts, tabulated: Eq. 28 costs two powers and two exponentials at every evaluation of
+//! the dynamics, which would be most of the simulation's time.
 
 use crate::friction::Stribeck;
 
