@@ -10,12 +10,15 @@ use flqr_core::export::{Controller, Format};
 use flqr_core::lqr;
 use flqr_core::model_file::presets;
 
-/// x, ẋ, pitch, pitch rate; left and right motor speed. The last one asks for more than the motors' limit.
-const STATES: [[f64; 6]; 4] = [
+/// x, ẋ, pitch, pitch rate; left and right motor speed. The fourth asks for more than the motors' limit, and
+/// the last two have a sensor that failed.
+const STATES: [[f64; 6]; 6] = [
     [0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
     [0.05, -0.1, 0.02, 0.1, 0.004, -0.004],
     [-0.2, 0.3, -0.05, -0.4, -3.0, 20.0],
     [3.0, 1.0, 0.6, 0.0, 40.0, 40.0],
+    [0.0, 0.0, f64::NAN, 0.0, 1.0, 1.0],
+    [0.0, f64::INFINITY, 0.0, 0.0, 1.0, 1.0],
 ];
 
 #[test]
@@ -42,11 +45,19 @@ fn c_header_agrees_with_the_controller() {
     assert_eq!(printed.lines().count(), STATES.len());
 }
 
+fn c_literal(number: f64) -> String {
+    match number {
+        f64::INFINITY => "INFINITY".to_owned(),
+        number if number.is_nan() => "NAN".to_owned(),
+        number => format!("{number:?}"),
+    }
+}
+
 /// Prints both torques for each of the states.
 fn compile_and_run(header: &str) -> String {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR"));
     let rows: String =
-        STATES.iter().map(|state| format!("{{{}}},", state.map(|x| format!("{x:?}")).join(","))).collect();
+        STATES.iter().map(|state| format!("{{{}}},", state.map(c_literal).join(","))).collect();
     let program = format!(
         "#include \"controller.h\"\n#include <stdio.h>\n\
          int main(void) {{\n\

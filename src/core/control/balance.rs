@@ -78,7 +78,8 @@ impl BalanceController {
     }
 
     /// Torques of the left and the right motor, N m: −K X (Eq. 13) plus the feedforward at each motor's
-    /// speed (Eq. 29), within the limit.
+    /// speed (Eq. 29), within the limit; 0 where a measurement is not a number, so that a sensor that failed
+    /// cannot drive the robot.
     pub fn step(&self, measurement: &Measurement) -> [f64; 2] {
         let feedback: Vector2<f64> = -(self.gain * measurement.state.to_vector());
         // A limit below zero or not a number switches the motors off.
@@ -86,7 +87,8 @@ impl BalanceController {
         std::array::from_fn(|motor| {
             let friction = self.feedforward[motor]
                 .map_or(0.0, |feedforward| feedforward.torque_nm(measurement.motor_speed_rad_s[motor]));
-            (feedback[motor] + friction).clamp(-limit, limit)
+            let torque = feedback[motor] + friction;
+            if torque.is_finite() { torque.clamp(-limit, limit) } else { 0.0 }
         })
     }
 }

@@ -81,6 +81,8 @@ static inline void flqr_step(const double state[4], const double motor_speed_rad
         }
         None => writeln!(text, "        (void)motor_speed_rad_s;")?,
     }
+    writeln!(text, "        if (!isfinite(torque)) /* a sensor that failed cannot drive the robot */")?;
+    writeln!(text, "            torque = 0.0;")?;
     if controller.torque_limit_nm.is_some() {
         writeln!(text, "        torque = fmax(-flqr_torque_limit_nm, fmin(flqr_torque_limit_nm, torque));")?;
     }
