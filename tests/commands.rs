@@ -97,6 +97,12 @@ fn riccati_of_a_double_integrator_has_its_closed_form() {
 }
 
 #[test]
+fn riccati_warns_of_keys_that_it_does_not_know() {
+    let path = file("cross.json", r#"{"a": [[0]], "b": [[1]], "q": [[1]], "r": [[1]], "s": [[1]]}"#);
+    assert_eq!(json(&["riccati", &path])["warnings"][0], "key `s` is unknown and was ignored");
+}
+
+#[test]
 fn riccati_refuses_what_has_no_answer() {
     for (name, text, part) in [
         (
@@ -206,10 +212,28 @@ fn wrong_models_are_refused_with_file_and_line() {
 }
 
 #[test]
-fn wrong_usage_ends_with_2_and_no_display_with_a_sentence() {
-    for arguments in [&["gains"][..], &["no-such-command"], &["simulate", PAPER, "--seconds", "-1"]] {
+fn flags_stand_anywhere() {
+    let behind = flqr(&["gains", PAPER, "--json"]);
+    assert_eq!(flqr(&["--json", "gains", PAPER]), behind);
+    assert_eq!(flqr(&["gains", "--json", PAPER]), behind);
+}
+
+#[test]
+fn wrong_usage_ends_with_2() {
+    for arguments in [
+        &["gains"][..],
+        &["no-such-command"],
+        &["simulate", PAPER, "--seconds", "-1"],
+        &["--paused", "gains", PAPER],
+    ] {
         refusal(arguments, 2);
     }
+}
+
+/// Other systems have a display even where these variables are not set.
+#[cfg(all(unix, not(target_os = "macos")))]
+#[test]
+fn without_a_display_a_sentence_names_the_commands() {
     let message = refusal(&[], 1);
     assert!(message.contains("display") && message.contains("flqr simulate"), "{message}");
 }

@@ -44,3 +44,19 @@ fn every_preset_and_picture_is_there() {
         assert!(Path::new(env!("CARGO_MANIFEST_DIR")).join(path).exists(), "{path}");
     }
 }
+
+#[test]
+fn every_link_within_leads_to_a_heading() {
+    let text = readme();
+    let anchor = |heading: &str| heading.to_lowercase().replace(' ', "-").replace(',', "");
+    let headings: BTreeSet<String> = text
+        .lines()
+        .filter(|line| line.starts_with('#'))
+        .map(|line| anchor(line.trim_start_matches('#').trim()))
+        .collect();
+    let links: Vec<&str> = text.split("](#").skip(1).filter_map(|rest| rest.split(')').next()).collect();
+    assert!(links.contains(&"limits"), "{links:?}");
+    for link in links {
+        assert!(headings.contains(link), "#{link} is none of {headings:?}");
+    }
+}

@@ -15,7 +15,7 @@ fn value(controller: &Controller) -> Value {
     serde_json::to_value(controller).expect("a controller is plain finite numbers and strings")
 }
 
-/// YAML: maps in block style, everything else as the JSON that YAML 1.2 contains.
+/// YAML: maps in block style, lists in flow style, strings as in JSON.
 pub(super) fn yaml(controller: &Controller) -> String {
     let mut text = String::new();
     write_yaml(&value(controller), 0, &mut text);
@@ -31,8 +31,20 @@ fn write_yaml(value: &Value, depth: usize, text: &mut String) {
             text.push_str(":\n");
             write_yaml(inner, depth + 1, text);
         } else {
-            text.push_str(&format!(": {inner}\n"));
+            text.push_str(&format!(": {}\n", yaml_leaf(inner)));
         }
+    }
+}
+
+/// YAML 1.1 reads a number with an exponent but no point as a string.
+fn yaml_leaf(value: &Value) -> String {
+    match value {
+        Value::Array(items) => format!("[{}]", items.iter().map(yaml_leaf).collect::<Vec<_>>().join(", ")),
+        Value::Number(number) => match number.to_string().split_once('e') {
+            Some((digits, exponent)) if !digits.contains('.') => format!("{digits}.0e{exponent}"),
+            _ => number.to_string(),
+        },
+        other => other.to_string(),
     }
 }
 
@@ -55,5 +67,37 @@ fn write_csv(value: &Value, path: &str, text: &mut String) {
         }
         Value::String(string) => text.push_str(&format!("{path},\"{}\"\n", string.replace('"', "\"\""))),
         leaf => text.push_str(&format!("{path},{leaf}\n")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::control::{BalanceController, ControllerKind};
+    use crate::model_file::presets;
+
+    fn controller() -> Controller {
+        let model = presets::paper();
+        let mut gain = nalgebra::Matrix2x4::from_element(-0.25);
+        gain[(0, 1)] = 1e-9;
+        let controller = BalanceController::new(ControllerKind::Flqr, model.robot().unwrap(), gain).unwrap();
+        Controller::new("a \"quoted\" name", &controller)
+    }
+
+    #[test]
+    fn yaml_is_readable_for_version_1_1_too() {
+        let text = yaml(&controller());
+        assert!(text.contains("gain:\n  left: [-0.25, 1.0e-9, -0.25, -0.25]\n"), "{text}");
+        assert!(text.starts_with("name: \"a \\\"quoted\\\" name\"\n"), "{text}");
+    }
+
+    #[test]
+    fn csv_has_one_row_for_each_leaf() {
+        let text = csv(&controller());
+        assert!(text.starts_with("key,value\nname,\"a \"\"quoted\"\" name\"\n"), "{text}");
+        assert!(
+            text.contains("\ngain.left.1,1e-9\n") && text.contains("\nfeedforward.right.offset_nm,0.0014\n")
+        );
+        assert!(text.lines().all(|line| line.split(',').count() == 2), "{text}");
     }
 }
