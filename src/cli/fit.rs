@@ -11,7 +11,7 @@ use flqr_core::record::{self, ColumnMap, HealthFinding, Log, Mapping, ReadOption
 use serde::Serialize;
 
 use super::input;
-use super::output::{Failure, Output};
+use super::output::{Failure, Output, number};
 use super::progress::Progress;
 
 #[derive(Args)]
@@ -136,16 +136,16 @@ fn read_log(path: &Path, map: &ColumnMap) -> Result<Log, Failure> {
 fn print(out: &mut dyn Write, report: &FitReport) -> io::Result<()> {
     writeln!(out, "{:24}{:>14}   95 % interval", "parameter", "value")?;
     for (name, estimate) in &report.parameters {
-        write!(out, "{name:24}{:>14.6}", estimate.value)?;
+        write!(out, "{name:24}{:>14}", number(estimate.value))?;
         match estimate.ci95 {
-            Some([low, high]) => writeln!(out, "   {low:.6} to {high:.6}")?,
+            Some([low, high]) => writeln!(out, "   {} to {}", number(low), number(high))?,
             None => writeln!(out, "   none")?,
         }
     }
     writeln!(
         out,
-        "\nRMSE {:.6} {}, relative error {:.2} %",
-        report.rmse,
+        "\nRMSE {} {}, relative error {:.2} %",
+        number(report.rmse),
         report.rmse_unit,
         100.0 * report.relative_error
     )?;

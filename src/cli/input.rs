@@ -1,16 +1,29 @@
 //! Files that commands read.
 
-use std::fs::{self, File};
-use std::io::BufReader;
+use std::fs::File;
+use std::io::{BufReader, Read};
 use std::path::Path;
 
 use flqr_core::model_file::{Model, RobotModel};
 
 use super::output::Failure;
 
-/// Reads a whole small text file.
+/// Largest text file that is read whole, bytes: a Riccati equation with 500 states is smaller.
+const LARGEST_TEXT: u64 = 64 << 20;
+
+/// Reads a whole text file of at most 64 MiB; the limit also ends devices that never do.
 pub(crate) fn read_text(path: &Path) -> Result<String, Failure> {
-    fs::read_to_string(path).map_err(|error| unreadable(path, &error))
+    let mut text = String::new();
+    let read = File::open(path).and_then(|file| file.take(LARGEST_TEXT + 1).read_to_string(&mut text));
+    match read {
+        Ok(bytes) if bytes as u64 > LARGEST_TEXT => Err(Failure::Message(format!(
+            "{}: the file is larger than the {} MiB that a text file may have: give the file that was meant",
+            path.display(),
+            LARGEST_TEXT >> 20
+        ))),
+        Ok(_) => Ok(text),
+        Err(error) => Err(unreadable(path, &error)),
+    }
 }
 
 /// Opens a file for buffered reading; its size in bytes comes along for progress.

@@ -12,7 +12,7 @@ mod window;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 
 use output::{Failure, Output};
 
@@ -20,7 +20,7 @@ use output::{Failure, Output};
 ///
 /// Without a command it opens the window. Numbers are SI, angles in rad.
 #[derive(Parser)]
-#[command(name = "flqr", version, args_conflicts_with_subcommands = true)]
+#[command(name = "flqr", version)]
 pub(crate) struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
@@ -47,6 +47,10 @@ enum Command {
 
 /// Runs the command and maps its outcome to an exit code: 0 done, 1 could not be done.
 pub(crate) fn run(cli: Cli) -> ExitCode {
+    if cli.command.is_some() && cli.window != window::Arguments::default() {
+        let message = "the flags of the window stand alone: give a command its flags behind its name";
+        Cli::command().error(clap::error::ErrorKind::ArgumentConflict, message).exit();
+    }
     let output = Output::new(cli.json);
     let done = match cli.command {
         None => window::run(cli.window),

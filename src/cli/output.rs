@@ -61,3 +61,33 @@ impl Output {
 pub(crate) fn complain(message: &str) {
     writeln!(io::stderr().lock(), "flqr: {message}").unwrap_or(());
 }
+
+/// A number with seven significant digits, in plain or exponent form whichever fits.
+pub(crate) fn number(value: f64) -> String {
+    let size = value.abs();
+    if size != 0.0 && !(1e-4..1e7).contains(&size) {
+        return format!("{value:.6e}");
+    }
+    let before_point = if size < 1.0 { 1 } else { size.log10() as usize + 1 };
+    let zeros_behind_point = if size == 0.0 || size >= 1.0 { 0 } else { (-size.log10()) as usize };
+    format!("{value:.*}", 7 + zeros_behind_point - before_point.min(7))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::number;
+
+    #[test]
+    fn small_and_large_numbers_keep_their_digits() {
+        for (value, text) in [
+            (0.0, "0.000000"),
+            (3e-7, "3.000000e-7"),
+            (-0.00049, "-0.000490000"),
+            (0.0338, "0.0338000"),
+            (95.116_856, "95.11686"),
+            (-1.5e9, "-1.500000e9"),
+        ] {
+            assert_eq!(number(value), text);
+        }
+    }
+}

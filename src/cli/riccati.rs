@@ -1,10 +1,12 @@
 //! `flqr riccati`: any continuous-time algebraic Riccati equation.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use flqr_core::lqr::{self, CareInput, CareSolution};
 use nalgebra::DMatrix;
+use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 
 use super::gains::rows;
@@ -26,6 +28,9 @@ struct Problem {
     b: Option<Rows>,
     r: Option<Rows>,
     g: Option<Rows>,
+    /// Keys that mean nothing here; a cross term of the cost would be one of them.
+    #[serde(flatten)]
+    unknown: BTreeMap<String, IgnoredAny>,
 }
 
 /// Keys of the JSON object; matrices as rows.
@@ -43,7 +48,10 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let path = &arguments.file;
     let problem: Problem = serde_json::from_str(&input::read_text(path)?)
         .map_err(|error| Failure::Message(format!("{}: {error}", path.display())))?;
-    let solution = solve(path, problem)?;
+    let ignored = problem.unknown.keys().map(|key| format!("key `{key}` is unknown and was ignored"));
+    let ignored: Vec<_> = ignored.collect();
+    let mut solution = solve(path, problem)?;
+    solution.warnings.extend(ignored);
     let keys = Solution {
         p: rows(&solution.p),
         k: solution.gain.as_ref().map(rows),
@@ -52,9 +60,9 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         warnings: solution.warnings.clone(),
     };
     output.result(&keys, |out| {
-        writeln!(out, "P ={:.9}", solution.p)?;
+        writeln!(out, "P ={:.9e}", solution.p)?;
         if let Some(gain) = &solution.gain {
-            writeln!(out, "K ={gain:.9}")?;
+            writeln!(out, "K ={gain:.9e}")?;
         }
         writeln!(out, "closed-loop poles")?;
         for pole in &solution.poles {

@@ -10,7 +10,7 @@ use flqr_gui::{Tab, WindowOptions};
 use super::input;
 use super::output::Failure;
 
-#[derive(Args)]
+#[derive(Args, Default, PartialEq)]
 pub(crate) struct Arguments {
     /// Model file to open in the window; without it, the paper's robot
     #[arg(long, value_name = "FILE")]
@@ -32,7 +32,7 @@ pub(crate) struct Arguments {
     state_out: Option<PathBuf>,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
 enum TabName {
     Tune,
     Friction,
