@@ -98,6 +98,23 @@ fn a_map_reads_the_columns_of_the_file() {
     );
 }
 
+/// Required columns stay finite whatever the factor.
+#[test]
+fn a_factor_that_overflows_a_value_drops_the_row() {
+    let text = "time_s,motor_angle_rad,torque_nm,current_a,celsius\n\
+                0,1,2,1,1\n1,1,2,1e300,1\n2,1,2,1,1e300\n3,1,2,1,1\n4,1,2,1,1\n";
+    let log = read(text, &["torque_nm=current_a*1e10", "motor_temperature_c=celsius*1e10"]).unwrap();
+    assert_eq!(log.column("torque_nm"), Some(&[1e10; 4][..]));
+    let temperature = log.column("motor_temperature_c").unwrap();
+    assert!(temperature[1].is_nan() && temperature[0] == 1e10, "{temperature:?}");
+    assert_eq!((log.dropped_rows, log.problem_count), (1, 2));
+    assert_eq!(
+        log.problems[0].to_string(),
+        "line 3, column `current_a`: 1e300 times 1e10 is not a finite number, the row was dropped"
+    );
+    assert!(log.problems[1].to_string().ends_with("the value is left out"), "{}", log.problems[1]);
+}
+
 /// Isolated damage: the log is read, the damage is listed.
 #[test]
 fn isolated_damage_becomes_a_problem_with_line_and_column() {

@@ -54,7 +54,7 @@ impl Table {
 
     /// Takes a row in, or drops it and notes why.
     pub(super) fn push(&mut self, row: &Row, file: &str) -> Result<(), LogError> {
-        if self.parse(row) {
+        if self.parse(row) && self.scales(row.line) {
             self.keep(row.line, file)
         } else {
             self.dropped += 1;
@@ -95,6 +95,22 @@ impl Table {
         false
     }
 
+    /// Whether the factors of the map leave every required value finite.
+    fn scales(&mut self, line: u64) -> bool {
+        let Self { plan, header, row, problems, .. } = self;
+        let mut usable = true;
+        for target in plan.targets.iter().filter(|target| target.factor != 1.0) {
+            let (value, factor, need) = (row[target.from], target.factor, plan.needs[target.from]);
+            if value.is_finite() && !(value * factor).is_finite() && need != Need::Unknown {
+                usable &= need != Need::Required;
+                problems.add(line, &header.names[target.from], || {
+                    format!("{value:e} times {factor:e} is not a finite number, {}", outcome(need))
+                });
+            }
+        }
+        usable
+    }
+
     fn keep(&mut self, line: u64, file: &str) -> Result<(), LogError> {
         let row = self.kept();
         if (row + 1) * self.columns.len() > self.max_values {
@@ -102,7 +118,8 @@ impl Table {
             return Err(LogError::TooLarge { file, line, limit, mebibytes: limit / (1 << 17) });
         }
         for (column, target) in self.columns.iter_mut().zip(&self.plan.targets) {
-            column.push(self.row[target.from] * target.factor);
+            let value = self.row[target.from] * target.factor;
+            column.push(if value.is_finite() { value } else { f64::NAN });
         }
         let offset = line - row as u64;
         if self.lines.last().is_none_or(|&(_, last)| last != offset) {
@@ -210,6 +227,10 @@ fn complaint(cell: &[u8], need: Need) -> String {
             Err(_) => format!("`{}` is not a number", text.chars().take(SHOWN).collect::<String>()),
         },
     };
-    let done = if need == Need::Required { "the row was dropped" } else { "the value is left out" };
-    format!("{what}, {done}")
+    format!("{what}, {}", outcome(need))
+}
+
+/// What damage does to a row.
+fn outcome(need: Need) -> &'static str {
+    if need == Need::Required { "the row was dropped" } else { "the value is left out" }
 }
