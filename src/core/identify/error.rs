@@ -39,6 +39,22 @@ pub enum FitError {
         /// The value.
         value: f64,
     },
+    /// A number that no motor reaches.
+    #[error(
+        "{file}: pair {row} has the impossible value {value:e} in `{column}`, beyond {limit:e}: remove the pair or map the right column and unit"
+    )]
+    Impossible {
+        /// The log.
+        file: String,
+        /// Pair, from 1.
+        row: usize,
+        /// Column that holds it.
+        column: &'static str,
+        /// The value.
+        value: f64,
+        /// The largest magnitude that is believed, unit of the column.
+        limit: f64,
+    },
     /// No stretch of constant speed is long enough.
     #[error(
         "{file}: no stretch of constant speed is long enough for pairs ({reason}), hold each speed for {seconds} s or more"

@@ -30,7 +30,8 @@ impl NormalEquations {
     pub(super) fn new(gram: &Matrix4<f64>, right: &Vector4<f64>) -> Self {
         /// Keeps collinear columns solvable; far below what changes a sum of squares.
         const RIDGE: f64 = 1e-14;
-        let scale = gram.diagonal().map(|square| if square > 0.0 { square.sqrt() } else { 1.0 });
+        let usable = |square: f64| square > 0.0 && square.is_finite();
+        let scale = gram.diagonal().map(|square| if usable(square) { square.sqrt() } else { 1.0 });
         let mut scaled = Matrix4::from_fn(|i, j| gram[(i, j)] / (scale[i] * scale[j]));
         for i in 0..4 {
             scaled[(i, i)] += RIDGE;

@@ -216,5 +216,5 @@ fn is_valley(sums: &[f64], n: usize) -> bool {
     let (row, column) = (n / exponents, n % exponents);
     let rows = row.saturating_sub(1)..(row + 2).min(speeds);
     rows.flat_map(|r| (column.saturating_sub(1)..(column + 2).min(exponents)).map(move |c| r * exponents + c))
-        .all(|neighbour| sums[n] <= sums[neighbour])
+        .all(|neighbour| sums[n].total_cmp(&sums[neighbour]).is_le())
 }

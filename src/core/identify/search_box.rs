@@ -3,6 +3,9 @@
 use super::FrictionPair;
 use super::parameters::{OFFSET, SPEED};
 
+/// A speed below this share of the fastest is standstill.
+const STANDSTILL: f64 = 1e-9;
+
 /// Which ranges to search.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Bounds {
@@ -34,9 +37,9 @@ impl SearchBox {
     /// of one direction can't tell f_c from f_p: f_p is then kept at 0 and counted into f_c.
     pub fn from_pairs(pairs: &[FrictionPair]) -> Self {
         let torque = pairs.iter().map(|p| p.torque_nm.abs()).fold(f64::MIN_POSITIVE, f64::max);
-        let speeds = || pairs.iter().map(|p| p.speed_rad_s.abs()).filter(|&q| q > 0.0);
+        let speeds = || pairs.iter().map(|p| p.speed_rad_s.abs());
         let fastest = speeds().fold(f64::MIN_POSITIVE, f64::max);
-        let slowest = speeds().fold(fastest, f64::min);
+        let slowest = speeds().filter(|&q| q > STANDSTILL * fastest).fold(fastest, f64::min);
         let mut found = Self {
             lower: [0.0, 0.0, slowest / 20.0, 0.05, 0.0, -2.0 * torque],
             upper: [5.0 * torque, 15.0 * torque, fastest / 5.0, 2.2, 5.0 * torque / fastest, 2.0 * torque],

@@ -16,11 +16,13 @@ use crate::friction::StribeckParameters;
 
 /// Six parameters need six speeds.
 const NEEDED_SPEEDS: usize = 6;
+/// No motor is faster, rad/s, or has more friction, N m.
+const LARGEST: f64 = 1e6;
 
 /// Fits Eq. 28 to pairs; `source` names them in messages.
 ///
 /// # Errors
-/// Pairs that are not finite, fewer than six distinct speeds, equal torques, or a `watch` that breaks.
+/// Pairs that are not finite or beyond 1e6 rad/s or N m, fewer than six distinct speeds, equal torques, or a `watch` that breaks.
 pub fn fit_pairs(
     pairs: &[FrictionPair],
     source: &str,
@@ -111,6 +113,9 @@ fn check(pairs: &[FrictionPair], source: &str) -> Result<(), FitError> {
         for (column, value) in [("speed_rad_s", pair.speed_rad_s), ("torque_nm", pair.torque_nm)] {
             if !value.is_finite() {
                 return Err(FitError::NotFinite { file, row: i + 1, column, value });
+            }
+            if value.abs() > LARGEST {
+                return Err(FitError::Impossible { file, row: i + 1, column, value, limit: LARGEST });
             }
         }
     }

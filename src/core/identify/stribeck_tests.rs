@@ -189,7 +189,13 @@ fn useless_pairs_are_refused_with_the_mend() {
     let pair = |speed_rad_s, torque_nm| FrictionPair { speed_rad_s, torque_nm };
     let mut broken = even_pairs(&LEFT, 20, 0.0, 1);
     broken[3].torque_nm = f64::NAN;
+    let mut fast = even_pairs(&LEFT, 20, 0.0, 1);
+    fast[5].speed_rad_s = 1e200;
+    let mut strong = even_pairs(&LEFT, 20, 0.0, 1);
+    strong[0].torque_nm = -2e6;
     for (pairs, expected) in [
+        (fast, "a.csv: pair 6 has the impossible value 1e200 in `speed_rad_s`, beyond 1e6"),
+        (strong, "a.csv: pair 1 has the impossible value -2e6 in `torque_nm`"),
         (broken, "a.csv: pair 4 has the value NaN in `torque_nm`"),
         (vec![], "have 0 distinct speeds"),
         (vec![pair(5.0, 0.1); 8], "all 8 pairs of a.csv are at one speed, 5.000 rad/s"),
@@ -198,6 +204,23 @@ fn useless_pairs_are_refused_with_the_mend() {
     ] {
         let error = fit_pairs(&pairs, "a.csv", &FitOptions::default(), &mut go_on).unwrap_err();
         assert!(error.to_string().contains(expected), "{error}");
+    }
+}
+
+/// Whatever numbers a file holds, a fit ends with a report or an error.
+#[test]
+fn extreme_pairs_do_not_panic() {
+    for (speed, torque) in
+        [(1e200, 0.05), (1e6, 1e6), (1e-310, 0.05), (0.0, 1e-200), (f64::MAX, f64::MAX), (1.0, 1e308)]
+    {
+        let mut pairs = even_pairs(&LEFT, 20, 0.001, 1);
+        pairs[9] = FrictionPair { speed_rad_s: speed, torque_nm: torque };
+        for bounds in [Bounds::Data, Bounds::Paper] {
+            let _ = fit_pairs(&pairs, "a.csv", &options(Method::Best, bounds, 1), &mut go_on);
+            let range =
+                if bounds == Bounds::Data { SearchBox::from_pairs(&pairs) } else { SearchBox::paper() };
+            assert!(polish_pairs(&pairs, &range).is_some(), "{speed} rad/s, {torque} N m");
+        }
     }
 }
 
