@@ -240,6 +240,15 @@ pub enum MotionError {
         /// The logs.
         files: String,
     },
+    /// Noise of the speed hides the slow motion that shows the Stribeck curve.
+    #[error(
+        "{files}: the position is too noisy to tell the Stribeck curve, record a faster motion or a finer position, \
+         or estimate without static_nm, stribeck_speed_rad_s and stribeck_exponent"
+    )]
+    StribeckHidden {
+        /// The logs.
+        files: String,
+    },
     /// The caller said stop.
     #[error("the fit was cancelled")]
     Cancelled,

@@ -12,6 +12,11 @@ const HIGHEST_CUTOFF_HZ: f64 = 100.0;
 /// by about that share.
 const NOISE_SHARE: f64 = 0.001;
 
+/// A shorter stretch is left out.
+const LEAST_ROWS: usize = 4;
+/// More samples than this for each row, and the uniform time has the mean step.
+const MOST_SAMPLES_PER_ROW: f64 = 4.0;
+
 /// A stretch of a log without gaps, on uniform time.
 pub(super) struct Stretch {
     /// Distance of samples, s.
@@ -49,10 +54,25 @@ pub(super) fn stretches(time_s: &[f64], position: &[f64], effort: &[f64]) -> Vec
     let times: Vec<f64> = rows.iter().map(|row| row[0]).collect();
     let step_s = row_time_s(&times).unwrap_or(f64::NAN);
     let longest = gap_s(step_s);
-    rows.chunk_by(|a, b| (0.0..=longest).contains(&(b[0] - a[0])))
-        .filter(|rows| rows.len() >= 4)
+    let pieces = || {
+        rows.chunk_by(|a, b| (0.0..=longest).contains(&(b[0] - a[0]))).filter(|rows| rows.len() >= LEAST_ROWS)
+    };
+    let step_s = grid_step_s(step_s, pieces());
+    pieces()
         .map(|rows| uniform(rows, step_s))
+        .filter(|stretch| stretch.position.len() >= LEAST_ROWS)
         .collect()
+}
+
+/// The usual step; the mean one where rows come in bursts, in which the usual step says nothing of their number.
+fn grid_step_s<'a>(usual_step_s: f64, pieces: impl Iterator<Item = &'a [[f64; 3]]>) -> f64 {
+    let (mut seconds, mut steps) = (0.0, 0);
+    for rows in pieces {
+        seconds += rows[rows.len() - 1][0] - rows[0][0];
+        steps += rows.len() - 1;
+    }
+    let mean_step_s = seconds / steps.max(1) as f64;
+    if mean_step_s > MOST_SAMPLES_PER_ROW * usual_step_s { mean_step_s } else { usual_step_s }
 }
 
 /// The longest step that is bridged: what the filters cannot see, at least two lost samples.
@@ -70,7 +90,8 @@ fn uniform(rows: &[[f64; 3]], usual_step_s: f64) -> Stretch {
     let on_grid = |(index, row): (usize, &[f64; 3])| {
         (row[0] - start - index as f64 * mean_step_s).abs() < 0.01 * mean_step_s
     };
-    if rows.iter().enumerate().all(on_grid) {
+    let is_usual = (0.5..2.0).contains(&(mean_step_s / usual_step_s));
+    if is_usual && rows.iter().enumerate().all(on_grid) {
         let column = |index: usize| rows.iter().map(|row| row[index]).collect();
         return Stretch { step_s: mean_step_s, position: column(1), effort: column(2) };
     }

@@ -220,6 +220,9 @@ impl Problem {
         if let (Some(start), [speed, exponent]) = (self.shape, self.shape_is_free())
             && (speed || exponent)
         {
+            if !self.span.is_open() {
+                return Err(MotionError::StribeckHidden { files: self.files });
+            }
             let span = self.span.clone();
             let best = search(start, [speed, exponent], &span, |shape, share| {
                 report(watch, 0.5 + 0.5 * share)?;

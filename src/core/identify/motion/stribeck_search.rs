@@ -43,6 +43,11 @@ impl Span {
         self.fastest = self.fastest.max(rms);
     }
 
+    /// Whether speeds are seen at which the curve could bend.
+    pub(super) fn is_open(&self) -> bool {
+        self.slowest < self.fastest
+    }
+
     fn lower(&self) -> [f64; 2] {
         [self.slowest.ln(), LOWEST_EXPONENT.ln()]
     }

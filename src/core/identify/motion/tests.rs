@@ -1,5 +1,5 @@
 use super::*;
-use crate::identify::test_data::measured;
+use crate::identify::test_data::{Noise, measured};
 
 fn fit(logs: &[Log], axis: Axis, known: Option<&KnownAxis>, estimate: &[&str]) -> MotionFit {
     let names: Vec<String> = estimate.iter().map(|name| (*name).to_owned()).collect();
@@ -103,6 +103,48 @@ const PAPER_LEFT: StribeckParameters = StribeckParameters {
     stribeck_exponent: 0.231,
     offset_nm: -0.0016,
 };
+
+/// Rows that come in pairs 1 µs apart: a usual step that says nothing of the number of rows.
+#[test]
+fn a_clock_in_bursts_needs_no_more_samples_than_a_few_for_each_row() {
+    let plant = Plant { rate_hz: 500.0, ..SHAFT };
+    let [time, angle, torque] = plant.run();
+    for burst in [2, 3] {
+        let repeat = |values: &[f64], later: f64| -> Vec<f64> {
+            let copies = |value: &f64| (0..burst).map(|n| value + later * f64::from(n)).collect::<Vec<_>>();
+            values.iter().flat_map(copies).collect()
+        };
+        let columns = [repeat(&time, 1e-6), repeat(&angle, 0.0), repeat(&torque, 0.0)];
+        let [time, angle, torque] = &columns;
+        let samples: usize =
+            kinematics::stretches(time, angle, torque).iter().map(|s| s.position.len()).sum();
+        assert!((1000..=5 * time.len()).contains(&samples), "{samples} samples of {} rows", time.len());
+        let names = ["time_s", "motor_angle_rad", "torque_nm"];
+        let log = Log::from_columns("bursts.csv", names.into_iter().zip(columns.clone()));
+        let found = fit(&[log], Axis::Rotary, None, &[]);
+        check(&found, &[("inertia_kg_m2", 0.005, 0.03), ("coulomb_nm", 0.05, 0.2)]);
+    }
+}
+
+/// Rare fast passes in a noisy position: what is slow is noise.
+#[test]
+fn a_stribeck_curve_under_noise_is_refused_with_the_mend() {
+    let mut noise = Noise::new(3);
+    let time: Vec<f64> = (0..75_000).map(|row| f64::from(row) * 2e-3).collect();
+    let pass = |t: f64| if t % 12.0 < 1.5 { 12.0 } else { 0.0 };
+    let speed: Vec<f64> = time.iter().map(|&t| if t % 24.0 < 12.0 { pass(t) } else { -pass(t) }).collect();
+    let mut angle = 0.0;
+    let angles = speed.iter().map(|v| {
+        angle += v * 2e-3;
+        angle + 0.55 * noise.normal()
+    });
+    let columns = [time.clone(), angles.collect(), speed.iter().map(|v| 0.05 * v.signum()).collect()];
+    let names = ["time_s", "motor_angle_rad", "torque_nm"];
+    let log = Log::from_columns("noisy.csv", names.into_iter().zip(columns));
+    let names = ["all".to_owned(), "static_nm".to_owned()];
+    let result = fit_motion(&[log], Axis::Rotary, None, &names, &mut |_| ControlFlow::Continue(()));
+    assert_eq!(result.unwrap_err(), MotionError::StribeckHidden { files: "noisy.csv".to_owned() });
+}
 
 /// A simulated axis, integrated here on its own.
 #[derive(Clone, Copy)]
