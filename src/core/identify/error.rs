@@ -117,7 +117,7 @@ pub enum FitError {
     },
     /// A robot on its wheels does not show its motors' friction alone.
     #[error(
-        "{file}: a robot log gives friction only with the wheels in the air at constant speeds, record such a sweep or use `refine`"
+        "{file}: a robot log gives friction only with the wheels in the air at constant speeds, record such a sweep"
     )]
     RobotMotion {
         /// The log.
