@@ -12,8 +12,8 @@ const FEW_SPEEDS: usize = 7;
 /// The Stribeck effect shows below this speed, rad/s.
 const SLOW_RAD_S: f64 = 0.2;
 
-/// What the pairs themselves leave open, whatever the fit.
-pub(super) fn pair_warnings(pairs: &[FrictionPair]) -> Vec<String> {
+/// What the pairs themselves leave open, whatever the fit within the box.
+pub(super) fn pair_warnings(pairs: &[FrictionPair], range: &SearchBox) -> Vec<String> {
     let mut warnings = Vec::new();
     let magnitudes = distinct_speeds(pairs.iter().map(|p| p.speed_rad_s.abs()));
     if magnitudes < FEW_SPEEDS {
@@ -29,11 +29,15 @@ pub(super) fn pair_warnings(pairs: &[FrictionPair]) -> Vec<String> {
         ));
     }
     if one_direction(pairs) {
-        warnings.push(
-            "all speeds have one direction: `offset_nm` can't be told from `coulomb_nm` and is set to 0, record \
-             the other direction too"
-                .to_owned(),
-        );
+        let done = if range.width(OFFSET) > 0.0 {
+            "their values share what was measured in any proportion"
+        } else {
+            "is set to 0"
+        };
+        warnings.push(format!(
+            "all speeds have one direction: `offset_nm` can't be told from `coulomb_nm` and {done}, record the \
+             other direction too"
+        ));
     }
     warnings
 }

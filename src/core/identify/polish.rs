@@ -18,12 +18,16 @@ const LINEAR: [usize; 4] = [COULOMB, STATIC, VISCOUS, OFFSET];
 const GRID: [usize; 2] = [12, 8];
 /// Valleys that are descended.
 const STARTS: usize = 3;
+/// Share of the sum of squares below which a gain is lost in rounding.
+const ROUNDING: f64 = 1e-12;
 
 /// A candidate with its sum of squared errors, (N m)².
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Fit {
     pub(super) point: Point,
     pub(super) sum: f64,
+    /// Whether no step promises a lower sum.
+    pub(super) converged: bool,
 }
 
 /// The optimum within the box. `hint` is one more point to descend from, such as a swarm's best.
@@ -34,8 +38,15 @@ pub(super) fn polish(samples: &Samples, range: &SearchBox, hint: Option<&Point>)
     starts
         .into_iter()
         .map(|start| projection.descend(start))
-        .reduce(|best, fit| if fit.sum < best.sum { fit } else { best })
+        .reduce(better)
         .expect("the smallest node of a grid is a valley")
+}
+
+/// The one with the lower sum. Of two in one valley it is converged where either is.
+fn better(one: Fit, other: Fit) -> Fit {
+    let (mut best, second) = if other.sum < one.sum { (other, one) } else { (one, other) };
+    best.converged |= second.converged && second.sum <= (1.0 + ROUNDING) * best.sum;
+    best
 }
 
 /// The optimum next to a point, within another box: for profiles.
@@ -94,7 +105,7 @@ impl<'a> Projection<'a> {
         point[SPEED] = at[0].exp();
         point[EXPONENT] = exponent;
         let sum = (0..self.samples.len()).map(|i| self.error(&linear.value, i).powi(2)).sum();
-        Node { fit: Fit { point, sum }, equations, linear }
+        Node { fit: Fit { point, sum, converged: false }, equations, linear }
     }
 
     /// Row `i` of A: derivatives of Eq. 28 by f_c, f_s, f_v and f_p.
@@ -140,6 +151,9 @@ impl<'a> Projection<'a> {
     fn descend(&mut self, start: Vector2<f64>) -> Fit {
         const STEPS: usize = 200;
         const LARGEST_DAMPING: f64 = 1e10;
+        /// Relative error at which every pair is met.
+        const EXACT: f64 = 1e-10;
+        let exact = EXACT.powi(2) * self.samples.torque.iter().map(|t| t * t).sum::<f64>();
         let mut at = self.inside(&start);
         let mut node = self.evaluate(&at);
         let mut slope = self.slope(&node);
@@ -147,7 +161,13 @@ impl<'a> Projection<'a> {
         for _ in 0..STEPS {
             let step = self.inside(&(at + self.step(&at, &slope, damping))) - at;
             let expected = -slope.0.dot(&step);
-            if damping > LARGEST_DAMPING || expected <= 1e-15 * node.fit.sum {
+            if expected <= 1e-15 * node.fit.sum || node.fit.sum <= exact {
+                node.fit.converged = true;
+                break;
+            }
+            if damping > LARGEST_DAMPING {
+                let full = self.inside(&(at + self.step(&at, &slope, 0.0))) - at;
+                node.fit.converged = -slope.0.dot(&full) <= ROUNDING * node.fit.sum;
                 break;
             }
             let trial = self.evaluate(&(at + step));

@@ -22,7 +22,7 @@ pub struct Estimate {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum StopReason {
-    /// All iterations were done.
+    /// All iterations were done, of the swarm alone or of the polish short of the optimum.
     MaxIterations,
     /// The error stayed below the threshold.
     ErrorThreshold,
@@ -43,9 +43,9 @@ pub struct FitReport {
     pub relative_error: f64,
     /// The pairs of section 3.1; empty for fits from motion.
     pub pairs: Vec<FrictionPair>,
-    /// Iterations of the swarm, or of the fit from motion.
+    /// Iterations of the swarm; 0 for fits from motion, which have none.
     pub iterations: usize,
-    /// Best error after each iteration, unit as `rmse`.
+    /// Best error after each of the `iterations`, unit as `rmse`.
     pub history: Vec<f64>,
     /// What is wrong with the logs.
     pub data_health: Vec<HealthFinding>,

@@ -275,6 +275,7 @@ fn naming_the_inertia_asks_for_a_fit_from_motion() {
     let report = fit(&[log], None, Motor::Left, &options, &mut |_| ControlFlow::Continue(())).unwrap();
     let inertia = report.parameters["inertia_kg_m2"].value;
     assert!((inertia / INERTIA - 1.0).abs() < 0.05, "{inertia}");
+    assert_eq!((report.iterations, report.history.len()), (0, 0));
 }
 
 #[test]

@@ -37,13 +37,9 @@ pub fn fit_pairs(
     let samples = Samples::new(pairs);
     let mut swarm = Pso::new(pairs, range, PsoSettings::default(), options.seed);
     let history = run(&mut swarm, watch)?;
-    let stop = match options.method {
-        Method::Best => StopReason::Converged,
-        Method::Pso if swarm.reached_threshold() => StopReason::ErrorThreshold,
-        Method::Pso => StopReason::MaxIterations,
-    };
-    let swarm_fit = Fit { point: *swarm.best_point(), sum: samples.sum_of_squares(swarm.best_point()) };
-    let mut warnings = pair_warnings(pairs);
+    let point = *swarm.best_point();
+    let swarm_fit = Fit { point, sum: samples.sum_of_squares(&point), converged: false };
+    let mut warnings = pair_warnings(pairs, &range);
     let (fit, intervals) = match options.method {
         Method::Pso => {
             warnings.push(
@@ -60,6 +56,18 @@ pub fn fit_pairs(
             (fit, confidence.intervals)
         }
     };
+    let stop = match options.method {
+        Method::Best if fit.converged => StopReason::Converged,
+        Method::Pso if swarm.reached_threshold() => StopReason::ErrorThreshold,
+        Method::Best | Method::Pso => StopReason::MaxIterations,
+    };
+    if options.method == Method::Best && !fit.converged {
+        warnings.push(
+            "the polish ran out of steps before the optimum: the data hardly tell the curves around it apart, record \
+             more speeds"
+                .to_owned(),
+        );
+    }
     warnings.extend(failed_bounds(&samples, pairs, &fit, options.bounds));
     let torque_square: f64 = pairs.iter().map(|p| p.torque_nm * p.torque_nm).sum();
     Ok(FitReport {

@@ -180,6 +180,11 @@ fn what_the_pairs_leave_open_is_said() {
     let one_way = check(geometric_speeds(40).filter(|q| *q > 0.0).collect(), Some("one direction"));
     assert_eq!(one_way.parameters["offset_nm"], Estimate { value: 0.0, ci95: None });
     assert!((one_way.parameters["coulomb_nm"].value - 0.054).abs() < 0.001);
+    assert!(one_way.warnings.join("\n").contains("and is set to 0"), "{:?}", one_way.warnings);
+    let pairs = pairs_at(&SHARP, geometric_speeds(40).filter(|q| *q > 0.0), 1e-4, 2);
+    let paper = fit_pairs(&pairs, "made up", &options(Method::Pso, Bounds::Paper, 1), &mut go_on).unwrap();
+    let text = paper.warnings.join("\n");
+    assert!(text.contains("share what was measured") && !text.contains("is set to 0"), "{text}");
     check(geometric_speeds(40).filter(|q| q.abs() > 0.5).collect(), Some("none is below 0.2 rad/s"));
     check(geometric_speeds(5).collect(), Some("only 5 distinct speeds"));
 }
@@ -222,6 +227,21 @@ fn extreme_pairs_do_not_panic() {
             assert!(polish_pairs(&pairs, &range).is_some(), "{speed} rad/s, {torque} N m");
         }
     }
+}
+
+/// Table 3 cuts this curve off in a flat valley whose bottom the polish does not reach.
+#[test]
+fn a_polish_that_runs_out_of_steps_says_so() {
+    let pairs = even_pairs(&SHARP, 260, 1e-6, 1);
+    for (bounds, stop) in [(Bounds::Data, StopReason::Converged), (Bounds::Paper, StopReason::MaxIterations)]
+    {
+        let report = fit_pairs(&pairs, "made up", &options(Method::Best, bounds, 1), &mut go_on).unwrap();
+        let said = report.warnings.iter().any(|warning| warning.contains("ran out of steps"));
+        assert_eq!((report.stop, said), (stop, stop != StopReason::Converged), "{:?}", report.warnings);
+    }
+    // Six speeds are met exactly: there is nothing left to gain.
+    let exact = even_pairs(&SHARP, 6, 0.0, 1);
+    assert!(polish::polish(&samples::Samples::new(&exact), &SearchBox::from_pairs(&exact), None).converged);
 }
 
 #[test]
