@@ -16,7 +16,7 @@ use crate::context::ViewContext;
 use crate::design::Designer;
 use crate::dialog::{Answer, Dialog};
 use crate::friction::FrictionTab;
-use crate::history::History;
+use crate::history::{Channel, History};
 use crate::job::{Job, Outcome, Waker};
 use crate::live::{Live, LiveCommand};
 use crate::recent::{self, Recent};
@@ -127,9 +127,7 @@ impl App {
         for command in self.commands.take() {
             self.apply(command, ctx);
         }
-        if self.designer.update(&self.session) {
-            self.send_controller();
-        }
+        self.follow_design();
         self.write_state(ctx);
     }
 
@@ -226,12 +224,26 @@ impl App {
         self.status = Status { text: text.into(), is_error: true };
     }
 
+    /// The running robot gets new gains; the first gains of a model start it.
+    fn follow_design(&mut self) {
+        let started = self.designer.in_force.is_some();
+        if self.designer.update(&self.session) {
+            if started {
+                self.send_controller();
+            } else {
+                self.reset_live();
+            }
+        }
+    }
+
     fn reset_live(&mut self) {
         self.history.clear();
         self.tune.reset_view();
-        if let Some((robot, controller)) = self.robot_and_controller() {
-            self.live.send(LiveCommand::Reset(Box::new(robot), controller));
-        }
+        self.live.send(match self.robot_and_controller() {
+            Some((robot, controller)) => LiveCommand::Reset(Box::new(robot), controller),
+            // The robot of before must not run on under another model's name.
+            None => LiveCommand::Clear,
+        });
     }
 
     fn send_robot(&mut self) {
@@ -301,6 +313,7 @@ impl App {
                 "fell": self.live.status.fell,
                 "seconds": self.history.end_s().floor(),
                 "lost_samples": self.live.status.lost_samples,
+                "displacement_mm": self.history.last(Channel::Displacement).map(|x_m| (1e3 * x_m).round()),
             },
             "friction_tab": self.friction.snapshot(),
             "message": self.status.text,

@@ -71,6 +71,11 @@ impl History {
         &self.channels[channel as usize]
     }
 
+    /// The newest sample of a channel.
+    pub(crate) fn last(&self, channel: Channel) -> Option<f64> {
+        self.channel(channel).last().copied()
+    }
+
     /// Time of the newest sample, s; 0 when there is none.
     pub(crate) fn end_s(&self) -> f64 {
         self.time_s.last().copied().unwrap_or(0.0)

@@ -29,6 +29,8 @@ pub(crate) enum LiveCommand {
     Robot(Box<RobotModel>, BalanceController),
     /// Back to the start.
     Reset(Box<RobotModel>, BalanceController),
+    /// No robot: nothing runs until one comes.
+    Clear,
     Pause(bool),
     Push {
         force_n: f64,
@@ -101,7 +103,7 @@ impl Live {
     pub(crate) fn send(&mut self, command: LiveCommand) {
         match &command {
             LiveCommand::Pause(paused) => self.status.paused = *paused,
-            LiveCommand::Reset(..) => {
+            LiveCommand::Reset(..) | LiveCommand::Clear => {
                 self.run += 1;
                 self.status = LiveStatus { paused: self.status.paused, ..LiveStatus::default() };
                 self.lost.store(0, Ordering::Relaxed);
@@ -246,11 +248,10 @@ impl Worker {
                 self.replace(&robot, controller, state, time_s);
             }
             LiveCommand::Reset(robot, controller) => {
-                self.run += 1;
-                (self.fell, self.late_s) = (false, 0.0);
-                self.pending.clear();
+                self.clear();
                 self.replace(&robot, controller, None, 0.0);
             }
+            LiveCommand::Clear => self.clear(),
             LiveCommand::Pause(paused) => self.paused = paused,
             LiveCommand::Push { force_n, duration_s } => {
                 if let Some(plant) = &mut self.plant {
@@ -264,6 +265,13 @@ impl Worker {
         ControlFlow::Break(())
     }
 
+    /// A new run without a robot.
+    fn clear(&mut self) {
+        self.run += 1;
+        (self.plant, self.fell, self.late_s, self.problem) = (None, false, 0.0, None);
+        self.pending.clear();
+    }
+
     fn replace(
         &mut self,
         robot: &RobotModel,
@@ -273,7 +281,7 @@ impl Worker {
     ) {
         match Plant::new(robot, controller, state, start_s) {
             Ok(plant) => (self.plant, self.problem) = (Some(plant), None),
-            // The robot of before goes on.
+            // The robot of before goes on, if this run has one.
             Err(problem) => self.problem = Some(problem),
         }
     }
@@ -314,7 +322,46 @@ impl Worker {
 
 #[cfg(test)]
 mod tests {
+    use flqr_core::control::ControllerKind;
+    use flqr_core::model_file::presets;
+
     use super::*;
+
+    fn worker(batches: SyncSender<Batch>) -> Worker {
+        Worker {
+            batches,
+            lost: Arc::default(),
+            waker: Arc::new(|| {}),
+            plant: None,
+            paused: false,
+            fell: false,
+            run: 0,
+            interval: Duration::from_millis(33),
+            clock: Clock::start(),
+            late_s: 0.0,
+            pending: Vec::new(),
+            problem: None,
+        }
+    }
+
+    #[test]
+    fn nothing_runs_and_no_old_sample_is_left_after_a_clear() {
+        let robot = *presets::paper().robot().unwrap();
+        let gain = nalgebra::Matrix2x4::repeat(-1.0);
+        let controller = BalanceController::new(ControllerKind::Lqr, &robot, gain).unwrap();
+        let (sender, batches) = sync_channel(4);
+        let mut worker = worker(sender);
+        assert!(worker.apply(LiveCommand::Reset(Box::new(robot), controller)).is_break());
+        assert!(!worker.idle());
+        worker.clock.anchor = Instant::now().checked_sub(Duration::from_millis(50)).unwrap();
+        worker.advance();
+        assert!(!worker.pending.is_empty());
+        assert!(worker.apply(LiveCommand::Clear).is_break());
+        assert!(worker.idle());
+        worker.report();
+        let batch = batches.try_recv().unwrap();
+        assert_eq!((batch.run, batch.samples.len()), (2, 0));
+    }
 
     #[test]
     fn a_slow_machine_skips_time_instead_of_falling_ever_further_behind() {

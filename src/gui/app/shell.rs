@@ -149,6 +149,7 @@ impl App {
         let state = match self.source {
             Source::Can => "CAN: no link",
             Source::Simulated if self.session.robot().is_none() => "no robot",
+            Source::Simulated if self.designer.in_force.is_none() => "no design, nothing runs",
             Source::Simulated if live.fell => "simulated: fallen",
             Source::Simulated if live.paused => "simulated: paused",
             Source::Simulated => "simulated: 1000 Hz",

@@ -225,6 +225,34 @@ fn the_simulated_robot_runs_is_pushed_paused_and_reset() {
 }
 
 #[test]
+fn without_a_design_nothing_runs_until_there_is_one() {
+    let bad = ROBOT.replace("[60.0, 30.0", "[-1.0, 30.0").replace("Test robot", "No design");
+    let rail = "name = \"No robot\"\n[axis]\nkind = \"linear\"\nmass_kg = 9.0\n";
+    for (name, text, shown) in
+        [("undesigned.toml", &*bad, "no design, nothing runs"), ("rail.toml", rail, "no robot")]
+    {
+        let file = TempFile::new(name, text);
+        let mut window = open(WindowOptions { paused: false, ..options(Tab::Tune) }, SIZE);
+        until(&mut window, "a sample", |s| s["simulation"]["displacement_mm"].is_number());
+        enter(&mut window, "model path", file.name());
+        let loaded = until(&mut window, "loading", |s| s["model"] != "Test robot");
+        assert!(loaded["gain"].is_null() && loaded["simulation"]["displacement_mm"].is_null(), "{loaded:#}");
+        window.get_by_label(shown);
+        // The robot of before would bring samples several times in this while.
+        for _ in 0..60 {
+            window.step();
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        let later = state(&window);
+        assert!(later["simulation"]["displacement_mm"].is_null(), "the robot of before: {later:#}");
+        if name == "undesigned.toml" {
+            enter(&mut window, "displacement weight", "60");
+            until(&mut window, "the start", |s| s["simulation"]["displacement_mm"].is_number());
+        }
+    }
+}
+
+#[test]
 fn a_log_is_loaded_by_path_fitted_and_used() {
     let log = TempFile::new("pairs.csv", &pairs_csv());
     let mut window = open(options(Tab::Friction), SIZE);

@@ -61,6 +61,9 @@ impl LivePlots {
                 "The robot fell (pitch beyond 0.8 rad) and is stopped. Reset puts it upright again.",
             );
         }
+        if context.designer.in_force.is_none() {
+            error_ui(ui, "There is no design, so nothing runs: weights that give one start the robot.");
+        }
         if let Some(problem) = &context.live.problem {
             error_ui(ui, format!("The simulated robot did not take the change: {problem}."));
         }
