@@ -113,6 +113,7 @@ impl App {
         app.designer.update(&app.session);
         app.designer.note_drag_start();
         app.reset_live();
+        app.say_loaded();
         if let Some(log) = options.log {
             app.commands.send(Command::LoadLog(log));
         }

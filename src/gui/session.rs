@@ -1,39 +1,49 @@
 //! The session document: all that a model file keeps and that undo would restore.
 
-use flqr_core::control::{BalanceController, ControllerKind, DEFAULT_COMPENSATION};
+use std::sync::LazyLock;
+
+use flqr_core::control::{BalanceController, ControllerKind};
 use flqr_core::friction::{Compensation, Stribeck};
 use flqr_core::lqr::Weights;
-use flqr_core::model_file::{AxisModel, Model, Rig, RobotModel};
+use flqr_core::model_file::{AxisModel, Model, Rig, RobotModel, presets};
 use nalgebra::Matrix2x4;
 
-/// Weights of a robot whose file has none: those of the paper's preset.
-pub(crate) fn default_weights() -> Weights {
-    Weights::diagonal([60.0, 30.0, 100.0, 5.0], [20.0, 20.0])
-}
+/// Weights and compensation of a robot whose file has none: those of the paper's preset.
+static FILLED_IN: LazyLock<(Weights, Compensation)> = LazyLock::new(|| {
+    let paper = presets::paper();
+    let settings = paper.robot().and_then(|robot| robot.weights.zip(robot.compensation));
+    settings.expect("a test of the core finds both in every preset")
+});
 
 /// What the user edits.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Session {
     /// Name of the model.
     pub(crate) name: String,
-    /// Robot or axis. A robot's weights and compensation are always present here.
+    /// Robot or axis, as in the file and as edited; what is filled in for use is not here, so it is not saved.
     pub(crate) rig: Rig,
     /// Whether friction is fed forward.
     pub(crate) controller: ControllerKind,
 }
 
 impl Session {
-    /// Opens a model; what its file leaves out is filled in.
+    /// Opens a model.
     pub(crate) fn new(model: Model, controller: ControllerKind) -> Self {
-        let rig = match model.rig {
-            Rig::Robot(mut robot) => {
-                robot.weights.get_or_insert_with(default_weights);
-                robot.compensation.get_or_insert(DEFAULT_COMPENSATION);
-                Rig::Robot(robot)
-            }
-            axis @ Rig::Axis(_) => axis,
+        Self { name: model.name, rig: model.rig, controller }
+    }
+
+    /// What is used although the model has it not, as a sentence.
+    pub(crate) fn filled_in(&self) -> Option<String> {
+        let robot = self.robot()?;
+        let tables = match (robot.weights, robot.compensation) {
+            (Some(_), Some(_)) => return None,
+            (None, Some(_)) => "[lqr]",
+            (Some(_), None) => "[compensation]",
+            (None, None) => "[lqr] and no [compensation]",
         };
-        Self { name: model.name, rig, controller }
+        Some(format!(
+            "It has no {tables}: the paper's preset fills in, and nothing of that is saved unedited."
+        ))
     }
 
     /// The model as it would be saved.
@@ -59,12 +69,12 @@ impl Session {
 
     /// Weights of the robot.
     pub(crate) fn weights(&self) -> Weights {
-        self.robot().and_then(|robot| robot.weights).unwrap_or_else(default_weights)
+        self.robot().and_then(|robot| robot.weights).unwrap_or(FILLED_IN.0)
     }
 
     /// Friction feedforward of the robot.
     pub(crate) fn compensation(&self) -> Compensation {
-        self.robot().and_then(|robot| robot.compensation).unwrap_or(DEFAULT_COMPENSATION)
+        self.robot().and_then(|robot| robot.compensation).unwrap_or(FILLED_IN.1)
     }
 
     /// Friction curve of one motor (0 left, 1 right), or of the axis.
@@ -78,9 +88,9 @@ impl Session {
     /// The controller that these settings and a gain make; none without a robot. FLQR without any friction
     /// is LQR, as [`Session::feedforward_problem`] says.
     pub(crate) fn balance_controller(&self, gain: Matrix2x4<f64>) -> Option<BalanceController> {
-        let robot = self.robot()?;
-        BalanceController::new(self.controller, robot, gain)
-            .or_else(|_| BalanceController::new(ControllerKind::Lqr, robot, gain))
+        let robot = RobotModel { compensation: Some(self.compensation()), ..*self.robot()? };
+        BalanceController::new(self.controller, &robot, gain)
+            .or_else(|_| BalanceController::new(ControllerKind::Lqr, &robot, gain))
             .ok()
     }
 

@@ -130,9 +130,9 @@ impl App {
 
     fn reset_weights(&mut self) {
         self.designer.note_drag_start();
-        let weights = self.saved.weights();
+        let weights = self.saved.robot().and_then(|robot| robot.weights);
         if let Some(robot) = self.session.robot_mut() {
-            robot.weights = Some(weights);
+            robot.weights = weights;
         }
         self.say("The weights are those of the loaded model again.");
     }
@@ -172,7 +172,12 @@ impl App {
             self.recent.note_model(&path);
             self.save_recent();
         }
-        self.say(format!("“{}” is loaded.", self.session.name));
+        self.say_loaded();
+    }
+
+    pub(super) fn say_loaded(&mut self) {
+        let filled_in = self.session.filled_in().map(|text| format!(" {text}")).unwrap_or_default();
+        self.say(format!("“{}” is loaded.{filled_in}", self.session.name));
     }
 
     fn load_model(&mut self, path: PathBuf) {

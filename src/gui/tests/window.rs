@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use egui::{Event, Key, Modifiers, PointerButton, Pos2, Vec2, vec2};
 use egui_kittest::{Harness, kittest::Queryable};
-use flqr_core::model_file::Model;
+use flqr_core::model_file::{Model, presets};
 use flqr_gui::{App, Tab, WindowOptions};
 use serde_json::Value;
 
@@ -348,6 +348,37 @@ fn a_model_is_saved_and_loaded_back() {
     enter(&mut window, "velocity weight", "5");
     click(&mut window, "Load");
     until(&mut window, "loading", |s| s["q_diagonal"][1] == 77.0);
+}
+
+#[test]
+fn settings_that_the_file_lacks_are_the_presets_said_and_not_saved() {
+    let (bare, _) = ROBOT.split_once("[lqr]").unwrap();
+    let file = TempFile::new("bare.toml", bare);
+    let mut window = open(options(Tab::Tune), SIZE);
+    enter(&mut window, "model path", file.name());
+    let loaded = until(&mut window, "loading", |s| {
+        s["message"].as_str().is_some_and(|message| message.contains("no [lqr] and no [compensation]"))
+    });
+    let paper = presets::paper().robot().unwrap().weights.unwrap();
+    assert_eq!(loaded["q_diagonal"], serde_json::json!(paper.q.diagonal().as_slice()));
+    assert_eq!(loaded["r_diagonal"], serde_json::json!(paper.r.diagonal().as_slice()));
+    assert!(loaded["gain"].is_array(), "{loaded:#}");
+    assert_eq!(loaded["unsaved_changes"], false);
+
+    let saved = |window: &mut Window| {
+        click(window, "Save");
+        until(window, "saving", |s| s["message"].as_str().is_some_and(|m| m.starts_with("Saved")));
+        *Model::from_toml(&std::fs::read_to_string(&file.0).unwrap(), "saved").unwrap().robot().unwrap()
+    };
+    let unedited = saved(&mut window);
+    assert_eq!((unedited.weights, unedited.compensation), (None, None));
+    enter(&mut window, "velocity weight", "3");
+    click(&mut window, "Reset weights");
+    assert_eq!(state(&window)["unsaved_changes"], false, "there is nothing to save again");
+    enter(&mut window, "velocity weight", "3");
+    let edited = saved(&mut window);
+    assert_eq!(edited.weights.unwrap().q[(1, 1)], 3.0);
+    assert_eq!(edited.compensation, None);
 }
 
 #[test]
