@@ -60,15 +60,12 @@ impl FrictionTab {
         }
     }
 
-    /// Starts loading; a fit of the log of before is cancelled.
+    /// Starts loading; the log of before and its fit stay until the new one is complete.
     pub(crate) fn load(&mut self, path: &Path, waker: &Waker) -> Result<(), String> {
         self.source.path = path.display().to_string();
         self.source.dialog_problem = None;
         let map = self.source.parse_column_map()?;
-        self.loader.start(path, map, waker)?;
-        self.fit.discard();
-        self.preview = Preview::default();
-        Ok(())
+        self.loader.start(path, map, waker)
     }
 
     pub(crate) fn cancel_load(&self) {
@@ -97,7 +94,13 @@ impl FrictionTab {
 
     /// Takes in what the workers have brought; a sentence if something ended.
     pub(crate) fn drain(&mut self) -> Option<String> {
+        let generation = |loader: &Loader| loader.log().map(|loaded| loaded.generation);
+        let before = generation(&self.loader);
         let loaded = self.loader.drain();
+        if generation(&self.loader) != before {
+            self.fit.discard();
+            self.preview = Preview::default();
+        }
         self.fit.drain().or(loaded)
     }
 

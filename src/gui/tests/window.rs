@@ -335,6 +335,27 @@ fn bad_logs_and_models_are_refused_in_one_sentence_and_nothing_is_lost() {
 }
 
 #[test]
+fn a_fit_survives_a_log_that_cannot_be_read_but_not_another_log() {
+    let good = TempFile::new("fitted.csv", &pairs_csv());
+    let other = TempFile::new("other.csv", &pairs_csv());
+    let bad = TempFile::new("unread.csv", "speed_rad_s,torque_nm\n");
+    let mut window = open(WindowOptions { log: Some(good.0.clone()), ..options(Tab::Friction) }, SIZE);
+    until(&mut window, "loading", |s| s["friction_tab"]["log"]["rows"] == 80);
+    click(&mut window, "Start fit");
+    let fitted = until(&mut window, "the fit", |s| s["friction_tab"]["fit"]["parameters"].is_object());
+    for path in ["/no/such/folder/log.csv", bad.name()] {
+        enter(&mut window, "log path", path);
+        let refused = until(&mut window, "refusal", |s| {
+            s["friction_tab"]["log"]["problem"].as_str().is_some_and(|problem| problem.contains(path))
+        });
+        assert_eq!(refused["friction_tab"]["fit"], fitted["friction_tab"]["fit"], "after {path}");
+    }
+    enter(&mut window, "log path", other.name());
+    let loaded = until(&mut window, "loading", |s| s["friction_tab"]["log"]["path"] == other.name());
+    assert!(loaded["friction_tab"]["fit"]["parameters"].is_null(), "{loaded:#}");
+}
+
+#[test]
 fn a_model_is_saved_and_loaded_back() {
     let file = TempFile::new("model.toml", "");
     let mut window = open(options(Tab::Tune), SIZE);
