@@ -3,11 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use egui::Context;
-use flqr_core::model_file::{AxisModel, Model, Rig, presets};
+use flqr_core::model_file::{Model, presets};
 
 use super::{App, ModelJob, Tab};
 use crate::command::{Command, FilePurpose, Source, Target};
 use crate::dialog::Dialog;
+use crate::friction::Fitted;
 use crate::job::{Job, Outcome};
 use crate::live::LiveCommand;
 use crate::session::Session;
@@ -252,25 +253,10 @@ impl App {
     }
 
     fn use_fit(&mut self, target: Target) {
-        let Some(curve) = self.friction.fitted_curve() else { return };
-        match &mut self.session.rig {
-            Rig::Robot(robot) => {
-                if target != Target::Right {
-                    robot.friction[0] = Some(curve);
-                }
-                if target != Target::Left {
-                    robot.friction[1] = Some(curve);
-                }
-                self.say(match target {
-                    Target::Left => "The left motor has the fitted friction, the simulated robot too.",
-                    Target::Right => "The right motor has the fitted friction, the simulated robot too.",
-                    Target::Both => "Both motors have the fitted friction, the simulated robot too.",
-                });
-            }
-            Rig::Axis(AxisModel::Rotary { friction, .. } | AxisModel::Linear { friction, .. }) => {
-                *friction = Some(curve);
-                self.say("The axis has the fitted friction.");
-            }
+        let put = |fitted: Fitted| fitted.put_into(&mut self.session.rig, target);
+        match self.friction.fitted().and_then(put) {
+            Ok(done) => self.say(done),
+            Err(problem) => return self.fail(problem),
         }
         self.tune.refresh(&self.session);
         self.send_robot();

@@ -8,6 +8,7 @@ use flqr_core::identify::{Bounds, FitOptions, FitProgress, FitReport, Method, Mo
 use flqr_core::model_file::{AxisModel, Model, Rig};
 use flqr_core::record::LogKind;
 
+use super::fitted::Fitted;
 use super::load::LoadedLog;
 use crate::command::Command;
 use crate::context::ViewContext;
@@ -162,6 +163,15 @@ impl FitRun {
             None => self.last_step.and_then(|step| step.best),
         };
         Stribeck::new(parameters?).ok()
+    }
+
+    /// What goes into a model: the result, or the best so far.
+    pub(super) fn fitted(&self) -> Result<Fitted, String> {
+        if let Some(report) = &self.report {
+            return Fitted::of(report);
+        }
+        let curve = self.curve().ok_or("There is no fitted curve yet: let a fit end.")?;
+        Ok(Fitted::Rotary { curve, inertia_kg_m2: None, gravity_torque_nm: None })
     }
 
     /// The motor whose friction is being fitted: 0 left, 1 right.

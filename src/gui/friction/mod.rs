@@ -2,6 +2,7 @@
 
 mod charts;
 mod fit;
+mod fitted;
 mod load;
 mod preview;
 mod result;
@@ -10,13 +11,13 @@ mod source;
 use std::path::Path;
 
 use egui::{CentralPanel, Frame, Margin, Panel, ScrollArea, Ui};
-use flqr_core::friction::Stribeck;
 use flqr_core::model_file::Model;
 
 use crate::command::FilePurpose;
 use crate::context::ViewContext;
 use crate::job::Waker;
 use fit::FitRun;
+pub(crate) use fitted::Fitted;
 use load::Loader;
 use preview::Preview;
 use source::SourceForm;
@@ -87,9 +88,9 @@ impl FrictionTab {
         self.fit.is_running()
     }
 
-    /// The curve of the last fit, if it is one that a motor can have.
-    pub(crate) fn fitted_curve(&self) -> Option<Stribeck> {
-        self.fit.curve()
+    /// What the last fit would put into a model, or why it has nothing for one.
+    pub(crate) fn fitted(&self) -> Result<Fitted, String> {
+        self.fit.fitted()
     }
 
     /// Takes in what the workers have brought; a sentence if something ended.

@@ -100,7 +100,7 @@ fn parameters_ui(report: &FitReport, ui: &mut Ui) {
 
 fn use_ui(context: &ViewContext<'_>, fit: &FitRun, ui: &mut Ui) {
     section_ui(ui, "Use in the model", |_| {});
-    let usable = fit.curve().is_some();
+    let problem = fit.fitted().and_then(|fitted| fitted.check(&context.session.rig)).err();
     let targets: &[(Target, &str)] = if context.session.robot().is_some() {
         &[(Target::Left, "Left motor"), (Target::Right, "Right motor"), (Target::Both, "Both motors")]
     } else {
@@ -108,14 +108,14 @@ fn use_ui(context: &ViewContext<'_>, fit: &FitRun, ui: &mut Ui) {
     };
     ui.horizontal(|ui| {
         for (target, name) in targets {
-            let button = ui.add_enabled(usable, egui::Button::new(*name));
-            let help = "Put the fitted curve into the model; the simulated robot gets it at once";
+            let button = ui.add_enabled(problem.is_none(), egui::Button::new(*name));
+            let help = "Put the fitted values into the model; the simulated robot gets them at once";
             if button.on_hover_text(help).clicked() {
                 context.commands.send(Command::UseFit(*target));
             }
         }
     });
-    if !usable {
-        hint_ui(ui, "This fit gave no complete Stribeck curve, so there is nothing to put into the model.");
+    if let Some(problem) = problem {
+        hint_ui(ui, problem);
     }
 }

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use egui::{Event, Key, Modifiers, PointerButton, Pos2, Vec2, vec2};
 use egui_kittest::{Harness, kittest::Queryable};
-use flqr_core::model_file::{Model, presets};
+use flqr_core::model_file::{AxisModel, Model, Rig, presets};
 use flqr_gui::{App, Tab, WindowOptions};
 use serde_json::Value;
 
@@ -227,9 +227,8 @@ fn the_simulated_robot_runs_is_pushed_paused_and_reset() {
 #[test]
 fn without_a_design_nothing_runs_until_there_is_one() {
     let bad = ROBOT.replace("[60.0, 30.0", "[-1.0, 30.0").replace("Test robot", "No design");
-    let rail = "name = \"No robot\"\n[axis]\nkind = \"linear\"\nmass_kg = 9.0\n";
     for (name, text, shown) in
-        [("undesigned.toml", &*bad, "no design, nothing runs"), ("rail.toml", rail, "no robot")]
+        [("undesigned.toml", &*bad, "no design, nothing runs"), ("no-robot.toml", RAIL, "no robot")]
     {
         let file = TempFile::new(name, text);
         let mut window = open(WindowOptions { paused: false, ..options(Tab::Tune) }, SIZE);
@@ -271,9 +270,9 @@ fn a_log_is_loaded_by_path_fitted_and_used() {
     window.get_by_label("speed_rad_s");
 }
 
-#[test]
-fn a_log_of_a_linear_axis_is_fitted_although_the_model_is_a_robot() {
-    let mut csv = String::from("time_s,position_m,force_n\n");
+/// A carriage of 20 kg with 50 N s/m, 5 N of Coulomb friction and an offset of 1 N.
+fn carriage_csv(columns: &str) -> String {
+    let mut csv = format!("{columns}\n");
     for index in 0..6000 {
         let time = f64::from(index) * 1e-3;
         let (mut position, mut velocity, mut acceleration) = (0.0, 0.0, 0.0);
@@ -285,13 +284,76 @@ fn a_log_of_a_linear_axis_is_fitted_although_the_model_is_a_robot() {
         let force = 20.0 * acceleration + 50.0 * velocity + 5.0 * velocity.signum() + 1.0;
         csv += &format!("{time:.3},{position:.9},{force:.6}\n");
     }
-    let log = TempFile::new("axis.csv", &csv);
+    csv
+}
+
+#[test]
+fn a_log_of_a_linear_axis_is_fitted_although_the_model_is_a_robot() {
+    let log = TempFile::new("axis.csv", &carriage_csv("time_s,position_m,force_n"));
     let mut window = open(WindowOptions { log: Some(log.0.clone()), ..options(Tab::Friction) }, SIZE);
     until(&mut window, "loading", |s| s["friction_tab"]["log"]["kind"] == "linear_axis");
     click(&mut window, "Start fit");
     let ended = until(&mut window, "the fit", |s| s["friction_tab"]["fit"]["running"] == false);
     let mass = ended["friction_tab"]["fit"]["parameters"]["mass_kg"]["value"].as_f64();
     assert!(mass.is_some_and(|mass| (mass - 20.0).abs() < 0.4), "{ended:#}");
+    window.get_by_label_contains("open the model of a linear axis");
+    click(&mut window, "Both motors");
+    assert_eq!(state(&window)["friction"], ended["friction"], "newtons are no torque");
+}
+
+const RAIL: &str = "name = \"Rail\"\n[axis]\nkind = \"linear\"\nmass_kg = 9.0\n";
+const SHAFT: &str = "name = \"Shaft\"\n[axis]\nkind = \"rotary\"\ninertia_kg_m2 = 9.0\n";
+
+#[test]
+fn a_fit_of_a_motion_goes_into_the_axis_with_inertia_or_mass() {
+    for (name, text, columns) in
+        [("rail", RAIL, "time_s,position_m,force_n"), ("shaft", SHAFT, "time_s,motor_angle_rad,torque_nm")]
+    {
+        let log = TempFile::new(&format!("{name}.csv"), &carriage_csv(columns));
+        let file = TempFile::new(&format!("{name}.toml"), text);
+        let model = Model::from_toml(text, name).unwrap();
+        let (log_path, model_path) = (Some(log.0.clone()), Some(file.0.clone()));
+        let mut window =
+            open(WindowOptions { model, model_path, log: log_path, ..options(Tab::Friction) }, SIZE);
+        until(&mut window, "loading", |s| s["friction_tab"]["log"]["rows"] == 6000);
+        click(&mut window, "Start fit");
+        until(&mut window, "the fit", |s| s["friction_tab"]["fit"]["running"] == false);
+        click(&mut window, "Axis");
+        assert_eq!(state(&window)["unsaved_changes"], true, "{:#}", state(&window));
+        window.key_press_modifiers(Modifiers::COMMAND, Key::S);
+        until(&mut window, "saving", |s| s["unsaved_changes"] == false);
+        let saved = Model::from_toml(&std::fs::read_to_string(&file.0).unwrap(), "saved").unwrap();
+        let (Rig::Axis(AxisModel::Linear { mass_kg: inertia, friction })
+        | Rig::Axis(AxisModel::Rotary { inertia_kg_m2: inertia, friction, .. })) = saved.rig
+        else {
+            panic!("{saved:?}")
+        };
+        let curve = *friction.unwrap().parameters();
+        for (found, true_value, tolerance) in [
+            (inertia, 20.0, 0.4),
+            (curve.viscous_nm_s_rad, 50.0, 1.0),
+            (curve.coulomb_nm, 5.0, 0.2),
+            (curve.offset_nm, 1.0, 0.1),
+        ] {
+            assert!((found - true_value).abs() < tolerance, "{name}: {saved:?}");
+        }
+        assert_eq!(curve.static_nm, curve.coulomb_nm, "no Stribeck part");
+    }
+}
+
+#[test]
+fn a_fit_of_a_motor_is_refused_by_a_linear_axis() {
+    let log = TempFile::new("motor.csv", &pairs_csv());
+    let model = Model::from_toml(RAIL, "rail").unwrap();
+    let mut window = open(WindowOptions { model, log: Some(log.0.clone()), ..options(Tab::Friction) }, SIZE);
+    until(&mut window, "loading", |s| s["friction_tab"]["log"]["rows"] == 80);
+    click(&mut window, "Start fit");
+    until(&mut window, "the fit", |s| s["friction_tab"]["fit"]["parameters"].is_object());
+    window.get_by_label_contains("the model is a linear axis");
+    click(&mut window, "Axis");
+    let after = state(&window);
+    assert!(after["friction"][0].is_null(), "{after:#}");
+    assert_eq!(after["unsaved_changes"], false);
 }
 
 #[test]
