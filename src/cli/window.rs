@@ -47,11 +47,10 @@ pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
         (Some(TabName::Friction), _) | (None, Some(_)) => Tab::Friction,
         (Some(TabName::Tune), _) | (None, None) => Tab::Tune,
     };
-    let map: Vec<_> = arguments.map.iter().map(Mapping::to_string).collect();
     let options = WindowOptions {
         model_path: arguments.model,
         log: arguments.log,
-        column_map: map.join(" "),
+        column_map: arguments.map,
         tab,
         paused: arguments.paused,
         state_out: arguments.state_out,

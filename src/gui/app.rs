@@ -97,7 +97,7 @@ impl App {
             designer: Designer::default(),
             live: Live::start(&waker, options.paused)?,
             history: History::default(),
-            friction: FrictionTab::new(options.column_map),
+            friction: FrictionTab::new(&options.column_map),
             commands: Commands::default(),
             status: Status::default(),
             recent: Recent::default(),

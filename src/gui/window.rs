@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use flqr_core::model_file::Model;
+use flqr_core::record::Mapping;
 
 use crate::app::{App, Tab};
 
@@ -15,8 +16,8 @@ pub struct WindowOptions {
     pub model_path: Option<PathBuf>,
     /// A log to load at once.
     pub log: Option<PathBuf>,
-    /// Column map for logs, entries `ours=theirs*factor` separated by spaces.
-    pub column_map: String,
+    /// Column map for logs.
+    pub column_map: Vec<Mapping>,
     /// The tab to begin with.
     pub tab: Tab,
     /// Whether the simulated robot starts paused.
@@ -34,7 +35,7 @@ impl WindowOptions {
             model,
             model_path: None,
             log: None,
-            column_map: String::new(),
+            column_map: Vec::new(),
             tab: Tab::Tune,
             paused: false,
             state_out: None,

@@ -12,6 +12,7 @@ use std::path::Path;
 
 use egui::{CentralPanel, Frame, Margin, Panel, ScrollArea, Ui};
 use flqr_core::model_file::Model;
+use flqr_core::record::Mapping;
 
 use crate::command::FilePurpose;
 use crate::context::ViewContext;
@@ -31,7 +32,7 @@ pub(crate) struct FrictionTab {
 }
 
 impl FrictionTab {
-    pub(crate) fn new(column_map: String) -> Self {
+    pub(crate) fn new(column_map: &[Mapping]) -> Self {
         Self {
             source: SourceForm::new(column_map),
             loader: Loader::default(),

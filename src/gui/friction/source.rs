@@ -23,13 +23,15 @@ pub(super) struct SourceForm {
 }
 
 impl SourceForm {
-    pub(super) fn new(column_map: String) -> Self {
+    pub(super) fn new(column_map: &[Mapping]) -> Self {
+        let column_map = column_map.iter().map(Mapping::to_string).collect::<Vec<_>>().join("; ");
         Self { path: String::new(), column_map, focus_path: false, dialog_problem: None }
     }
 
-    /// The column map as typed: entries `ours=theirs*factor`, separated by spaces.
+    /// The column map as typed: entries `ours=theirs*factor`, separated by `;` because names may have spaces.
     pub(super) fn parse_column_map(&self) -> Result<ColumnMap, String> {
-        let entries: Result<Vec<Mapping>, _> = self.column_map.split_whitespace().map(str::parse).collect();
+        let entries = self.column_map.split(';').map(str::trim).filter(|entry| !entry.is_empty());
+        let entries: Result<Vec<Mapping>, _> = entries.map(str::parse).collect();
         entries.and_then(ColumnMap::new).map_err(|error| format!("column map: {error}"))
     }
 
@@ -67,10 +69,10 @@ impl SourceForm {
 
     fn map_ui(&mut self, ui: &mut Ui) {
         let field = TextEdit::singleline(&mut self.column_map)
-            .hint_text("column map, for other names or units")
+            .hint_text("column map: ours=theirs*factor; …")
             .desired_width(f32::INFINITY);
         ui.add(field).accessible_name("column map").on_hover_text(
-            "For files with other column names or units: ours=theirs*factor, several separated by spaces.\nExample: torque_nm=current_a*0.32 motor_angle_rad=angle_rad",
+            "For files with other column names or units: ours=theirs*factor, several separated by “;”.\nExample: torque_nm=current_a*0.32; motor_angle_rad=Angle (rad)",
         );
         if let Err(problem) = self.parse_column_map() {
             error_ui(ui, problem);
@@ -160,5 +162,32 @@ fn line_problems_ui(loaded: &LoadedLog, ui: &mut Ui) {
     warning_ui(ui, count);
     for problem in log.problems.iter().take(SHOWN_PROBLEMS) {
         ui.label(RichText::new(problem.to_string()).small().weak());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_map_handed_over_is_read_back_also_with_spaces_in_names() {
+        let map: Vec<Mapping> = ["motor_angle_rad=Angle (rad)", "torque_nm=Motor current*0.32"]
+            .map(|entry| entry.parse().unwrap())
+            .to_vec();
+        let form = SourceForm::new(&map);
+        assert_eq!(form.column_map, "motor_angle_rad=Angle (rad); torque_nm=Motor current*0.32");
+        assert_eq!(form.parse_column_map().unwrap().entries(), map);
+    }
+
+    #[test]
+    fn empty_entries_are_none() {
+        for text in ["", "  ", ";", " ; torque_nm=a ;"] {
+            let form = SourceForm { column_map: text.to_owned(), ..SourceForm::new(&[]) };
+            assert_eq!(
+                form.parse_column_map().unwrap().entries().len(),
+                usize::from(text.contains('=')),
+                "{text:?}"
+            );
+        }
     }
 }
