@@ -19,7 +19,7 @@ use crate::friction::FrictionTab;
 use crate::history::{Channel, History};
 use crate::job::{Job, Outcome, Waker};
 use crate::live::{Live, LiveCommand};
-use crate::recent::{self, Recent};
+use crate::recent::{Recent, RecentFile};
 use crate::session::Session;
 use crate::state_out::StateOut;
 use crate::tune::TuneTab;
@@ -64,7 +64,7 @@ pub struct App {
     commands: Commands,
     status: Status,
     recent: Recent,
-    recent_file: Option<PathBuf>,
+    recent_file: Option<RecentFile>,
     recent_job: Option<Job<(), Recent>>,
     dialog: Option<Dialog>,
     model_job: Option<ModelJob>,
@@ -102,7 +102,7 @@ impl App {
             status: Status::default(),
             recent: Recent::default(),
             recent_job: read_recent(options.recent_file.clone(), &waker)?,
-            recent_file: options.recent_file,
+            recent_file: options.recent_file.map(RecentFile::new),
             dialog: None,
             model_job: None,
             state_out,
@@ -179,6 +179,9 @@ impl App {
                 Outcome::Broken => self.recent_job = None,
             }
         }
+        if let Some(file) = &mut self.recent_file {
+            file.drain(&self.waker);
+        }
         self.drain_dialog();
         self.drain_model_job();
     }
@@ -205,16 +208,11 @@ impl App {
         }
     }
 
-    /// Writes the list of recent files, on a thread whose end nobody waits for.
     fn save_recent(&mut self) {
         self.recent.column_map = self.friction.column_map().to_owned();
-        let Some(path) = self.recent_file.clone() else { return };
-        let text = self.recent.to_json();
-        // Losing the list is no reason to bother anyone.
-        std::thread::Builder::new()
-            .name("save-recent".to_owned())
-            .spawn(move || recent::write_file(&path, &text).ok())
-            .ok();
+        if let Some(file) = &mut self.recent_file {
+            file.save(&self.recent, &self.waker);
+        }
     }
 
     fn say(&mut self, text: impl Into<String>) {

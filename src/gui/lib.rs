@@ -25,6 +25,7 @@ mod theme;
 mod tune;
 mod widgets;
 mod window;
+mod write_file;
 
 pub use app::{App, Tab};
 pub use window::{WindowError, WindowOptions, run};

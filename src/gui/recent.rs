@@ -6,6 +6,9 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use crate::job::{Job, Outcome, Reporter, Waker};
+use crate::write_file::write_file;
+
 const VERSION: u32 = 1;
 const LONGEST_LIST: usize = 8;
 
@@ -68,20 +71,61 @@ pub(crate) fn default_file() -> Option<PathBuf> {
     Some(config.join("flqr").join("recent.json"))
 }
 
-/// Writes by way of a second file, so that a crash leaves the old list or the new one.
-pub(crate) fn write_file(path: &Path, text: &str) -> std::io::Result<()> {
-    if let Some(folder) = path.parent() {
-        std::fs::create_dir_all(folder)?;
+/// The file of the list. One write at a time, so that the last list wins; losing it is no reason to bother anyone.
+pub(crate) struct RecentFile {
+    path: PathBuf,
+    job: Option<Job<(), ()>>,
+    /// The newest list that came during a write.
+    waiting: Option<String>,
+}
+
+impl RecentFile {
+    pub(crate) fn new(path: PathBuf) -> Self {
+        Self { path, job: None, waiting: None }
     }
-    let mut name = path.as_os_str().to_owned();
-    name.push(".new");
-    std::fs::write(&name, text)?;
-    std::fs::rename(&name, path)
+
+    /// Writes the list on a thread, after the write that goes on.
+    pub(crate) fn save(&mut self, recent: &Recent, waker: &Waker) {
+        self.waiting = Some(recent.to_json());
+        self.drain(waker);
+    }
+
+    /// Starts the write that waits, once the one of before has ended.
+    pub(crate) fn drain(&mut self, waker: &Waker) {
+        if self.job.as_mut().is_some_and(|job| matches!(job.poll().1, Outcome::Running)) {
+            return;
+        }
+        let path = self.path.clone();
+        self.job = self.waiting.take().and_then(|text| {
+            let write = move |_: &Reporter<()>| {
+                write_file(&path, &text).ok();
+            };
+            Job::start("save-recent", waker, write).ok()
+        });
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn of_many_lists_the_last_is_kept() {
+        let path = std::env::temp_dir().join(format!("flqr-recent-{}.json", std::process::id()));
+        let waker: Waker = std::sync::Arc::new(|| {});
+        let mut file = RecentFile::new(path.clone());
+        let mut recent = Recent::default();
+        for number in 0..200 {
+            recent.note_log(Path::new(&format!("/{number}.csv")));
+            file.save(&recent, &waker);
+        }
+        while file.job.is_some() {
+            file.drain(&waker);
+            std::thread::yield_now();
+        }
+        assert_eq!(Recent::from_json(&std::fs::read_to_string(&path).unwrap()).logs, recent.logs);
+        std::fs::remove_file(path).unwrap();
+    }
 
     #[test]
     fn a_damaged_or_newer_list_is_an_empty_one() {

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-use crate::recent::write_file;
+use crate::write_file::write_file;
 
 /// The file is written at most this often.
 const INTERVAL: Duration = Duration::from_millis(200);

@@ -154,6 +154,9 @@ impl App {
 
     fn load_preset(&mut self, number: usize) {
         let Some((name, text)) = presets::ALL.get(number) else { return };
+        if self.model_file_is_busy() {
+            return;
+        }
         match Model::from_toml(text, name) {
             Ok(model) => self.open_model(model, None),
             Err(error) => self.fail(error.to_string()),
@@ -181,7 +184,19 @@ impl App {
         self.say(format!("“{}” is loaded.{filled_in}", self.session.name));
     }
 
+    /// One file at a time: a later job must not be taken over by the end of an earlier one. Says so.
+    fn model_file_is_busy(&mut self) -> bool {
+        let busy = self.model_job.is_some();
+        if busy {
+            self.fail("A model file is still being read or written: try again when that has ended.");
+        }
+        busy
+    }
+
     fn load_model(&mut self, path: PathBuf) {
+        if self.model_file_is_busy() {
+            return;
+        }
         let file = path.clone();
         match Job::start("load-model", &self.waker, move |_| read_model(&file)) {
             Ok(job) => self.model_job = Some(ModelJob::Load(path, job)),
@@ -190,10 +205,13 @@ impl App {
     }
 
     fn save_model(&mut self, path: PathBuf) {
+        if self.model_file_is_busy() {
+            return;
+        }
         let path = if path.extension().is_none() { path.with_extension("toml") } else { path };
         let (file, text) = (path.clone(), self.session.model().to_toml());
         let write = move |_: &crate::job::Reporter<()>| {
-            crate::recent::write_file(&file, &text).map_err(|error| {
+            crate::write_file::write_file(&file, &text).map_err(|error| {
                 format!("{} could not be saved: {error}; nothing was changed", file.display())
             })
         };

@@ -433,6 +433,26 @@ fn a_model_is_saved_and_loaded_back() {
     until(&mut window, "loading", |s| s["q_diagonal"][1] == 77.0);
 }
 
+/// A pipe holds the reading up until something is written to it.
+#[cfg(unix)]
+#[test]
+fn a_second_model_file_waits_for_the_end_of_the_first() {
+    let pipe = TempFile::new("pipe.toml", "");
+    std::fs::remove_file(&pipe.0).unwrap();
+    assert!(std::process::Command::new("mkfifo").arg(&pipe.0).status().unwrap().success());
+    let other = TempFile::new("beside.toml", "as before");
+    let model_path = Some(other.0.clone());
+    let mut window = open(WindowOptions { model_path, ..options(Tab::Tune) }, SIZE);
+    enter(&mut window, "model path", pipe.name());
+    window.key_press_modifiers(Modifiers::COMMAND, Key::S);
+    window.run_steps(3);
+    let busy = state(&window);
+    assert!(busy["message"].as_str().unwrap().contains("still being read"), "{busy:#}");
+    std::fs::write(&pipe.0, ROBOT.replace("Test robot", "From the pipe")).unwrap();
+    until(&mut window, "loading", |s| s["model"] == "From the pipe");
+    assert_eq!(std::fs::read_to_string(&other.0).unwrap(), "as before", "nothing was saved");
+}
+
 #[test]
 fn settings_that_the_file_lacks_are_the_presets_said_and_not_saved() {
     let (bare, _) = ROBOT.split_once("[lqr]").unwrap();
