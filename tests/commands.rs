@@ -157,7 +157,8 @@ fn bad_logs_are_refused_in_one_sentence() {
         let message = refusal(&["fit", &file(name, text)], 1);
         assert!(message.contains(part) && message.contains(name), "{message}");
     }
-    assert!(refusal(&["fit", "no_such.csv"], 1).contains("no_such.csv"));
+    assert!(refusal(&["fit", "no_such.csv"], 1).contains("no_such.csv: there is no such file"));
+    assert!(refusal(&["fit", "presets"], 1).contains("presets: this is a folder"));
     assert!(refusal(&["fit", "x.csv", "--map", "torque_nm"], 2).contains("torque_nm"));
 }
 
@@ -184,6 +185,17 @@ fn a_simulated_run_is_a_robot_log() {
     let header = text.lines().next().unwrap();
     assert!(header.starts_with("time_s,x_m,x_dot_m_s,pitch_rad,pitch_rate_rad_s"), "{header}");
     assert_eq!(text.lines().count(), 2001);
+}
+
+#[test]
+fn a_log_that_cannot_be_written_leaves_nothing_behind() {
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("unwritable");
+    std::fs::create_dir_all(folder.join("run.csv")).unwrap();
+    let path = folder.join("run.csv").display().to_string();
+    let message = refusal(&["simulate", PAPER, "--seconds", "1", "--log", &path], 1);
+    assert!(message.contains("run.csv") && message.contains("check the folder"), "{message}");
+    let left: Vec<_> = std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    assert_eq!(left, ["run.csv"]);
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Files that commands read.
 
 use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io::{self, BufReader, Read};
 use std::path::Path;
 
 use flqr_core::model_file::{Model, RobotModel};
@@ -29,8 +29,11 @@ pub(crate) fn read_text(path: &Path) -> Result<String, Failure> {
 /// Opens a file for buffered reading; its size in bytes comes along for progress.
 pub(crate) fn open(path: &Path) -> Result<(BufReader<File>, u64), Failure> {
     let file = File::open(path).map_err(|error| unreadable(path, &error))?;
-    let bytes = file.metadata().map_err(|error| unreadable(path, &error))?.len();
-    Ok((BufReader::with_capacity(1 << 16, file), bytes))
+    let about = file.metadata().map_err(|error| unreadable(path, &error))?;
+    if about.is_dir() {
+        return Err(unreadable(path, &io::ErrorKind::IsADirectory.into()));
+    }
+    Ok((BufReader::with_capacity(1 << 16, file), about.len()))
 }
 
 /// Loads a model file.
@@ -50,6 +53,13 @@ pub(crate) fn load_robot(path: &Path) -> Result<(String, RobotModel), Failure> {
     }
 }
 
-fn unreadable(path: &Path, error: &std::io::Error) -> Failure {
-    Failure::Message(format!("{}: cannot read the file: {error}", path.display()))
+fn unreadable(path: &Path, error: &io::Error) -> Failure {
+    let problem = match error.kind() {
+        io::ErrorKind::NotFound => "there is no such file: check the path".to_owned(),
+        io::ErrorKind::PermissionDenied => "the file may not be read: check its permissions".to_owned(),
+        io::ErrorKind::IsADirectory => "this is a folder: give a file in it".to_owned(),
+        io::ErrorKind::InvalidData => "this is not text: give the file that was meant".to_owned(),
+        _ => format!("cannot read the file: {error}"),
+    };
+    Failure::Message(format!("{}: {problem}", path.display()))
 }

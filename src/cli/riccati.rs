@@ -47,7 +47,7 @@ struct Solution {
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let path = &arguments.file;
     let problem: Problem = serde_json::from_str(&input::read_text(path)?)
-        .map_err(|error| Failure::Message(format!("{}: {error}", path.display())))?;
+        .map_err(|error| Failure::Message(format!("{}: {}", path.display(), unread(&error))))?;
     let ignored = problem.unknown.keys().map(|key| format!("key `{key}` is unknown and was ignored"));
     let ignored: Vec<_> = ignored.collect();
     let mut solution = solve(path, problem)?;
@@ -71,6 +71,11 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         writeln!(out, "residual {:.1e} (relative to P)", solution.relative_residual)?;
         solution.warnings.iter().try_for_each(|warning| writeln!(out, "warning: {warning}"))
     })
+}
+
+fn unread(error: &serde_json::Error) -> String {
+    let words = error.to_string().replace("struct Problem", "an object").replace("f64", "a number");
+    format!("{words}: give one JSON object with the matrices a, q and either b and r, or g, as lists of rows")
 }
 
 fn solve(path: &Path, problem: Problem) -> Result<CareSolution, Failure> {

@@ -68,12 +68,14 @@ pub enum AxisModel {
 
 /// Why a model file could not be loaded.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{file}:{line}: {problem}")]
+#[error("{file}:{line}:{column}: {problem}")]
 pub struct ModelFileError {
     /// The file as the user named it.
     pub file: String,
     /// Line, from 1.
     pub line: usize,
+    /// Column in bytes, from 1.
+    pub column: usize,
     /// What is wrong and how it is mended.
     pub problem: String,
 }
@@ -84,11 +86,25 @@ impl Model {
     /// # Errors
     /// Text that is not TOML, a missing or unknown key, a value of the wrong type or out of range.
     pub fn from_toml(text: &str, file: &str) -> Result<Self, ModelFileError> {
-        let error = |line, problem: String| ModelFileError { file: file.to_owned(), line, problem };
-        let unread = |e: toml::de::Error| {
-            error(e.span().map_or(1, |span| line_at(text, span.start)), one_line(e.message()))
+        let error = |byte, problem| {
+            let (line, column) = position_at(text, byte);
+            ModelFileError { file: file.to_owned(), line, column, problem }
         };
-        let document = toml::de::DeTable::parse(text).map_err(unread)?;
+        let start = |e: &toml::de::Error| e.span().map_or(0, |span| span.start);
+        let not_toml = |e: toml::de::Error| {
+            let found = line_around(text, start(&e));
+            error(
+                start(&e),
+                format!("{} in `{found}`: write it as key = value or [table]", in_words(e.message())),
+            )
+        };
+        let unread = |e: toml::de::Error| {
+            let found = line_around(text, start(&e));
+            let about_keys = e.message().contains("field `");
+            let place = if about_keys { String::new() } else { format!(" in `{found}`") };
+            error(start(&e), format!("{}{place}", in_words(e.message())))
+        };
+        let document = toml::de::DeTable::parse(text).map_err(not_toml)?;
         let has = |table: &str| document.get_ref().contains_key(table);
         let model = match (has("robot"), has("axis")) {
             (true, false) => toml::from_str::<RobotFile>(text).map_err(unread)?.into_model(),
@@ -102,7 +118,7 @@ impl Model {
                 "a model needs a [robot] table, or an [axis] table for a single motor or carriage: add one",
             )),
         };
-        model.map_err(|refusal| error(line_of(text, document.get_ref(), &refusal.path), refusal.problem))
+        model.map_err(|refusal| error(start_of(document.get_ref(), &refusal.path), refusal.problem))
     }
 
     /// The model as TOML that [`Model::from_toml`] reads back to an equal model.
@@ -123,16 +139,27 @@ impl Model {
     }
 }
 
-fn one_line(message: &str) -> String {
-    message.split_whitespace().collect::<Vec<_>>().join(" ")
+/// A message of the TOML reader in one line and without Rust's names.
+fn in_words(message: &str) -> String {
+    let line = message.split_whitespace().collect::<Vec<_>>().join(" ");
+    line.replace("f64", "a number").replace("an array of length", "a list of length")
 }
 
-fn line_at(text: &str, byte: usize) -> usize {
-    1 + text.as_bytes().iter().take(byte).filter(|&&b| b == b'\n').count()
+/// Line and column, from 1, of a byte.
+fn position_at(text: &str, byte: usize) -> (usize, usize) {
+    let before = &text.as_bytes()[..byte.min(text.len())];
+    let line_start = before.iter().rposition(|&b| b == b'\n').map_or(0, |newline| newline + 1);
+    (1 + before.iter().filter(|&&b| b == b'\n').count(), 1 + before.len() - line_start)
 }
 
-/// Line of the deepest key of `path` that the document has; 1 where it has none.
-fn line_of(text: &str, document: &toml::de::DeTable<'_>, path: &[&str]) -> usize {
+/// The line that a byte is in, cut to what a message can hold.
+fn line_around(text: &str, byte: usize) -> String {
+    let (line, _) = position_at(text, byte);
+    text.lines().nth(line - 1).unwrap_or_default().trim().chars().take(60).collect()
+}
+
+/// First byte of the deepest key of `path` that the document has; 0 where it has none.
+fn start_of(document: &toml::de::DeTable<'_>, path: &[&str]) -> usize {
     let mut table = document;
     let mut start = 0;
     for key in path {
@@ -141,7 +168,7 @@ fn line_of(text: &str, document: &toml::de::DeTable<'_>, path: &[&str]) -> usize
         let Some(inner) = value.get_ref().as_table() else { break };
         table = inner;
     }
-    line_at(text, start)
+    start
 }
 
 #[cfg(test)]
@@ -217,11 +244,12 @@ offset_n = -3.2
             ),
             (ROBOT.replace("static_nm = 0.0761", "static_nm = nan"), 11, "static_nm = NaN is out of range"),
             (ROBOT.replace("wheel_radius_m = 0.1\n", ""), 2, "missing field `wheel_radius_m`"),
-            (ROBOT.replace("13.0", "\"heavy\""), 3, "expected f64"),
+            (ROBOT.replace("13.0", "\"heavy\""), 3, "`body_mass_kg = \"heavy\"`"),
             (ROBOT.replace("[lqr]", "[lqr]\nr = [[1.0, 0.0], [0.0, 1.0]]"), 17, "remove one"),
             (ROBOT.replace("r_diagonal = [20.0, 20.0]", ""), 16, "r_diagonal"),
             (ROBOT.replace("r_diagonal = [20.0, 20.0]", "r_diagonal = [20.0]"), 18, "length"),
-            (ROBOT.replace("[lqr]", "[lqr"), 16, ""),
+            (ROBOT.replace("[lqr]", "[lqr"), 16, "in `[lqr`"),
+            (ROBOT.replace("13.0", "13,0"), 3, "in `body_mass_kg = 13,0`"),
             ("name = \"x\"\n".to_owned(), 1, "[robot]"),
             (
                 ROBOT.replace("[friction.left]", "[axis]\nkind = \"linear\"\nmass_kg = 1.0\n[friction.left]"),
@@ -236,7 +264,7 @@ offset_n = -3.2
                 error.line == line && error.problem.contains(part),
                 "{error} (expected line {line}, {part})"
             );
-            assert!(!error.to_string().contains('\n'), "{error}");
+            assert!(!error.to_string().contains('\n') && !error.problem.contains("f64"), "{error}");
         }
     }
 }
