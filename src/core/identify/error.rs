@@ -55,6 +55,14 @@ pub enum FitError {
         /// The largest magnitude that is believed, unit of the column.
         limit: f64,
     },
+    /// A name that is not one of the six.
+    #[error("`{name}` is not a parameter that constant speeds give, estimate all or some of {allowed}")]
+    UnknownParameter {
+        /// The name.
+        name: String,
+        /// The names that are allowed.
+        allowed: String,
+    },
     /// No stretch of constant speed is long enough.
     #[error(
         "{file}: no stretch of constant speed is long enough for pairs ({reason}), hold each speed for {seconds} s or more"
@@ -64,6 +72,8 @@ pub enum FitError {
         file: String,
         /// What was found instead.
         reason: String,
+        /// Stretches of constant speed that are too short.
+        short_dwells: usize,
         /// The least time at one speed, s.
         seconds: f64,
     },

@@ -3,28 +3,55 @@
 use std::ops::ControlFlow;
 
 use super::motion::{Axis, KnownAxis, MotionError, fit_motion};
+use super::parameters::KEYS;
 use super::{
     Estimate, FitError, FitOptions, FitProgress, FitReport, FrictionPair, Motor, PairSet, StopReason,
     fit_pairs, pairs_from_log,
 };
-use crate::friction::Stribeck;
 use crate::model_file::{AxisModel, Model, Rig};
 use crate::record::{HealthFinding, Log, LogKind, Severity, data_health};
+
+/// From this many short dwells on a log looks like a staircase.
+const FEW_DWELLS: usize = 3;
 
 /// What a log holds.
 enum Content {
     Pairs(PairSet),
-    Motion(Axis),
+    /// With why it gave no pairs, where it looks like a recording of constant speeds.
+    Motion(Axis, Option<String>),
 }
 
 impl Content {
     fn name(&self) -> &'static str {
         match self {
             Self::Pairs(_) => "constant speeds",
-            Self::Motion(Axis::Rotary) => "a motion of a shaft",
-            Self::Motion(Axis::Linear) => "a motion of a carriage",
+            Self::Motion(Axis::Rotary, _) => "a motion of a shaft",
+            Self::Motion(Axis::Linear, _) => "a motion of a carriage",
         }
     }
+
+    fn note(&self) -> Option<String> {
+        match self {
+            Self::Pairs(_) => None,
+            Self::Motion(_, note) => note.clone(),
+        }
+    }
+}
+
+/// Whether constant speeds give the parameters that are named; a warning where they are not all of them.
+fn check_estimate(names: &[String]) -> Result<Option<String>, FitError> {
+    let is_known = |name: &str| name == "all" || KEYS.contains(&name);
+    if let Some(name) = names.iter().find(|name| !is_known(name)) {
+        return Err(FitError::UnknownParameter { name: name.clone(), allowed: KEYS.join(", ") });
+    }
+    let named = |key: &str| names.iter().any(|name| name == "all" || name == key);
+    let partly = !names.is_empty() && !KEYS.into_iter().all(named);
+    Ok(partly.then(|| {
+        format!(
+            "`{}` was asked for: constant speeds give all six parameters only together",
+            names.join("`, `")
+        )
+    }))
 }
 
 /// Fits friction, and for motions inertia or mass, to one or more logs of one motor or axis.
@@ -54,9 +81,15 @@ pub fn fit(
         });
     }
     let mut report = match first {
-        Content::Pairs(_) => fit_pairs(&merged(&contents), &sources(logs), options, watch)?,
-        Content::Motion(axis) => motion_report(logs, *axis, model, motor, options, watch)?,
+        Content::Pairs(_) => {
+            let together = check_estimate(&options.estimate)?;
+            let mut report = fit_pairs(&merged(&contents), &sources(logs), options, watch)?;
+            report.warnings.extend(together);
+            report
+        }
+        Content::Motion(axis, _) => motion_report(logs, *axis, model, motor, options, watch)?,
     };
+    report.warnings.extend(contents.iter().filter_map(Content::note));
     report.data_health =
         logs.iter().zip(&contents).flat_map(|(log, content)| findings(log, content)).collect();
     Ok(report)
@@ -69,17 +102,28 @@ fn content(
     options: &FitOptions,
 ) -> Result<Content, FitError> {
     let asks_for_motion = options.estimate.iter().any(|name| name == "inertia_kg_m2" || name == "mass_kg");
-    let constant =
-        || pairs_from_log(log, motor).map(|set| set.is_constant_speed().then_some(Content::Pairs(set)));
     match kind(log, model)? {
         LogKind::FrictionPairs => Ok(Content::Pairs(pairs_from_log(log, motor)?)),
-        LogKind::LinearAxis => Ok(Content::Motion(Axis::Linear)),
-        LogKind::Bench if asks_for_motion => Ok(Content::Motion(Axis::Rotary)),
-        LogKind::Bench => Ok(constant().ok().flatten().unwrap_or(Content::Motion(Axis::Rotary))),
+        LogKind::LinearAxis => Ok(Content::Motion(Axis::Linear, None)),
+        LogKind::Bench if asks_for_motion => Ok(Content::Motion(Axis::Rotary, None)),
+        LogKind::Bench => Ok(match pairs_from_log(log, motor) {
+            Ok(set) if set.is_constant_speed() => Content::Pairs(set),
+            Ok(_) => Content::Motion(Axis::Rotary, None),
+            Err(error) => Content::Motion(Axis::Rotary, note_of(log, &error)),
+        }),
         LogKind::Robot => {
-            constant().ok().flatten().ok_or_else(|| FitError::RobotMotion { file: log.source.clone() })
+            let set = pairs_from_log(log, motor).ok().filter(PairSet::is_constant_speed);
+            set.map(Content::Pairs).ok_or_else(|| FitError::RobotMotion { file: log.source.clone() })
         }
     }
+}
+
+/// Says why a log that was to hold constant speeds, as short dwells or a target speed tell, is fitted as a motion.
+fn note_of(log: &Log, error: &FitError) -> Option<String> {
+    let FitError::NoPairs { short_dwells, .. } = error else { return None };
+    let target = log.column("target_speed_rad_s");
+    let has_target = target.is_some_and(|values| values.iter().any(|value| value.is_finite()));
+    (has_target || *short_dwells >= FEW_DWELLS).then(|| format!("it was fitted as a motion: {error}"))
 }
 
 /// The kind of a log; the model's axis decides where the columns serve both axes, and must fit them.
@@ -102,7 +146,7 @@ fn kind(log: &Log, model: Option<&Model>) -> Result<LogKind, FitError> {
 fn merged(contents: &[Content]) -> Vec<FrictionPair> {
     let pairs = |content: &Content| match content {
         Content::Pairs(set) => set.pairs.clone(),
-        Content::Motion(_) => Vec::new(),
+        Content::Motion(..) => Vec::new(),
     };
     contents.iter().flat_map(pairs).collect()
 }
@@ -160,20 +204,12 @@ fn motion_report(
 
 /// What a model knows of the axis on the bench; of a robot it is one wheel in the air.
 fn known_axis(model: &Model, motor: Motor) -> KnownAxis {
-    let parameters = |friction: &Option<Stribeck>| friction.as_ref().map(|curve| *curve.parameters());
     match &model.rig {
         Rig::Robot(robot) => KnownAxis {
             inertia: robot.parameters.wheel_inertia_kg_m2,
-            friction: parameters(&robot.friction[motor as usize]),
+            friction: robot.friction[motor as usize].map(|curve| *curve.parameters()),
             gravity_torque_nm: 0.0,
         },
-        Rig::Axis(AxisModel::Rotary { inertia_kg_m2, gravity_torque_nm, friction }) => KnownAxis {
-            inertia: *inertia_kg_m2,
-            friction: parameters(friction),
-            gravity_torque_nm: *gravity_torque_nm,
-        },
-        Rig::Axis(AxisModel::Linear { mass_kg, friction }) => {
-            KnownAxis { inertia: *mass_kg, friction: parameters(friction), gravity_torque_nm: 0.0 }
-        }
+        Rig::Axis(axis) => axis.into(),
     }
 }

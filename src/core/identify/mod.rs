@@ -88,7 +88,8 @@ pub struct FitOptions {
     /// Where they are searched.
     pub bounds: Bounds,
     /// Parameters to free in fits from motion, keys as in the model file, or `all`. Naming `inertia_kg_m2` or
-    /// `mass_kg` asks for such a fit also where the log holds constant speeds.
+    /// `mass_kg` asks for such a fit also where a log of a bench holds constant speeds; these give all six
+    /// parameters whichever are named.
     pub estimate: Vec<String>,
     /// Seed of the swarm.
     pub seed: u64,

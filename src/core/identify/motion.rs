@@ -129,15 +129,6 @@ pub struct KnownAxis {
     pub gravity_torque_nm: f64,
 }
 
-impl From<&AxisModel> for Axis {
-    fn from(model: &AxisModel) -> Self {
-        match model {
-            AxisModel::Rotary { .. } => Self::Rotary,
-            AxisModel::Linear { .. } => Self::Linear,
-        }
-    }
-}
-
 impl From<&AxisModel> for KnownAxis {
     fn from(model: &AxisModel) -> Self {
         let (inertia, gravity_torque_nm, friction) = match *model {

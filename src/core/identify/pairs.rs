@@ -74,11 +74,12 @@ pub fn pairs_from_log(log: &Log, motor: Motor) -> Result<PairSet, FitError> {
     let columns = [log.required(LogKind::Bench, names[0])?, log.required(LogKind::Bench, names[1])?];
     let recording =
         Recording::new(time, columns[0], columns[1], log.column(names[2]), log.column("target_speed_rad_s"));
-    let set = pairs_of(&recording);
+    let (set, short_dwells) = pairs_of(&recording);
     if set.pairs.is_empty() {
         return Err(FitError::NoPairs {
             file: log.source.clone(),
             reason: set.warnings.first().cloned().unwrap_or_else(|| "the speed never stays".to_owned()),
+            short_dwells,
             seconds: super::staircase::LEAST_DWELL_S,
         });
     }
@@ -95,7 +96,8 @@ fn pairs_file(speed: &[f64], torque: &[f64]) -> PairSet {
     }
 }
 
-fn pairs_of(recording: &Recording) -> PairSet {
+/// The pairs, and how many dwells are too short for them.
+fn pairs_of(recording: &Recording) -> (PairSet, usize) {
     let found = split(recording);
     let mut set = PairSet {
         pairs: Vec::new(),
@@ -115,7 +117,7 @@ fn pairs_of(recording: &Recording) -> PairSet {
             speed_rad_s: recording.mean_speed(start..end),
         });
     }
-    set
+    (set, found.short_dwells)
 }
 
 fn segment_pair(recording: &Recording, rows: std::ops::Range<usize>) -> FrictionPair {

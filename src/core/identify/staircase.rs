@@ -35,6 +35,8 @@ pub(super) struct Recording<'a> {
 pub(super) struct Split {
     pub(super) dwells: Vec<Range<usize>>,
     pub(super) constant_share: f64,
+    /// Stretches of constant speed that are too short.
+    pub(super) short_dwells: usize,
     pub(super) warnings: Vec<String>,
 }
 
@@ -124,7 +126,7 @@ struct Level {
 
 /// Splits a recording at its speeds.
 pub(super) fn split(recording: &Recording) -> Split {
-    let mut found = Split { dwells: Vec::new(), constant_share: 0.0, warnings: Vec::new() };
+    let mut found = Split { dwells: Vec::new(), constant_share: 0.0, short_dwells: 0, warnings: Vec::new() };
     if recording.time.len() < LEAST_SAMPLES {
         found.warnings.push(format!("the log has only {} usable rows", recording.time.len()));
         return found;
@@ -136,7 +138,10 @@ pub(super) fn split(recording: &Recording) -> Split {
     for piece in recording.pieces() {
         let blocks = Blocks::new(recording, piece, block);
         moving += blocks.moving_time(recording);
-        for rows in candidates(recording, &blocks, &mut found.warnings) {
+        let before = found.warnings.len();
+        let candidates = candidates(recording, &blocks, &mut found.warnings);
+        found.short_dwells += found.warnings.len() - before;
+        for rows in candidates {
             let rows = settled(&blocks, rows);
             if keep(recording, &blocks, &rows, &mut found.warnings) {
                 constant += recording.duration(&rows);
@@ -255,8 +260,9 @@ fn is_flat(blocks: &Blocks, levels: &[Level], i: usize) -> bool {
     };
     let level = &levels[i];
     let step = (level.mean - neighbours.0.mean).abs().min((level.mean - neighbours.1.mean).abs());
-    let drift = drift(&blocks.speed[level.blocks.clone()]).abs();
-    level.blocks.len() >= 4 && level.mean.abs() > LEVEL_RAD_S && drift < 0.25 * step
+    let values = &blocks.speed[level.blocks.clone()];
+    let flat = drift(values).abs() < 0.25 * step && !bends(values, level.mean);
+    level.blocks.len() >= 4 && level.mean.abs() > LEVEL_RAD_S && flat
 }
 
 /// A candidate without the blocks at its start in which the motor is still on its way to the speed of its second
@@ -294,8 +300,8 @@ fn keep(recording: &Recording, blocks: &Blocks, rows: &Range<usize>, warnings: &
     let spread = 3.5 * swing / (values.len().max(1) as f64).sqrt();
     let allowed = (0.1 * speed.abs()).max(2.0 * LEVEL_RAD_S).max(spread.min(0.3 * speed.abs()));
     let moved = drift(values).abs();
-    let bends = bend(values).abs() > (0.06 * speed.abs()).max(2.0 * LEVEL_RAD_S);
-    let steady = !bends && moved <= allowed && swing <= (0.15 * speed.abs()).max(5.0 * LEVEL_RAD_S);
+    let steady =
+        !bends(values, speed) && moved <= allowed && swing <= (0.15 * speed.abs()).max(5.0 * LEVEL_RAD_S);
     if !steady {
         warnings.push(format!(
             "the speed is not constant from {:.2} s to {:.2} s (mean {speed:.3}, drift {moved:.3}, standard deviation \
@@ -393,6 +399,11 @@ fn drift(values: &[f64]) -> f64 {
     }
     let x: Vec<f64> = (0..values.len()).map(|i| i as f64).collect();
     slope(&x, values) * (values.len() - 1) as f64
+}
+
+/// Whether the speed is rather the top of a swing.
+fn bends(values: &[f64], speed: f64) -> bool {
+    bend(values).abs() > (0.06 * speed.abs()).max(2.0 * LEVEL_RAD_S)
 }
 
 /// Mean of the middle third less that of the outer thirds: the top of a swing is no constant speed, however flat.

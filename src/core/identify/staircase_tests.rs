@@ -3,7 +3,7 @@
 
 use std::ops::ControlFlow;
 
-use super::test_data::{Noise, RIGHT, measured};
+use super::test_data::{Noise, RIGHT, even_pairs, measured};
 use super::*;
 use crate::friction::Stribeck;
 use crate::record::Log;
@@ -276,6 +276,52 @@ fn naming_the_inertia_asks_for_a_fit_from_motion() {
     let inertia = report.parameters["inertia_kg_m2"].value;
     assert!((inertia / INERTIA - 1.0).abs() < 0.05, "{inertia}");
     assert_eq!((report.iterations, report.history.len()), (0, 0));
+}
+
+#[test]
+fn names_to_estimate_are_checked_for_constant_speeds() {
+    let run = |names: &[&str]| {
+        let estimate = names.iter().map(|name| (*name).to_owned()).collect();
+        let options = FitOptions { estimate, ..FitOptions::default() };
+        let pairs = even_pairs(&RIGHT, 40, 0.001, 1);
+        let speeds = pairs.iter().map(|pair| pair.speed_rad_s).collect();
+        let torques = pairs.iter().map(|pair| pair.torque_nm).collect();
+        let log = Log::from_columns("pairs.csv", [("speed_rad_s", speeds), ("torque_nm", torques)]);
+        fit(&[log], None, Motor::Left, &options, &mut |_| ControlFlow::Continue(()))
+    };
+    for name in ["nonsense", "inertia_kg_m2", ""] {
+        let error = run(&["static_nm", name]).unwrap_err().to_string();
+        let expected = format!("`{name}` is not a parameter that constant speeds give");
+        assert!(error.starts_with(&expected) && error.contains("coulomb_nm, static_nm"), "{error}");
+    }
+    let six = &super::parameters::KEYS[..];
+    for (names, partly) in [(&["all"][..], false), (&[], false), (six, false), (&["static_nm"], true)] {
+        let text = run(names).unwrap().warnings.join("\n");
+        assert_eq!(text.contains("`static_nm` was asked for"), partly, "{names:?}: {text}");
+    }
+}
+
+/// A staircase too short for pairs is fitted as a motion and says why; a motion that is none does not.
+#[test]
+fn a_staircase_that_became_a_motion_says_why() {
+    let levels: Vec<(f64, f64)> = both_directions(&[2.0, 6.0, 10.0, 15.0, 9.0, 4.0], 0.3);
+    let run =
+        |log: Log| fit(&[log], None, Motor::Left, &FitOptions::default(), &mut |_| ControlFlow::Continue(()));
+    for with_target in [false, true] {
+        let report = run(record(&levels, Bench { with_target, ramp_rad_s2: 60.0, ..BENCH }, 1)).unwrap();
+        let text = report.warnings.join("\n");
+        assert!(report.pairs.is_empty(), "{:?}", report.pairs);
+        assert!(
+            text.contains("fitted as a motion: bench.csv: no stretch") && text.contains("0.5 s"),
+            "{text}"
+        );
+    }
+    let time: Vec<f64> = (0..10_000).map(|i| f64::from(i) * 0.001).collect();
+    let angle = time.iter().map(|t| 5.0 * (7.0 * t).sin()).collect();
+    let torque = time.iter().map(|t| -0.005 * 245.0 * (7.0 * t).sin() + 0.05 * (7.0 * t).cos().signum());
+    let columns = [("torque_nm", torque.collect()), ("motor_angle_rad", angle), ("time_s", time)];
+    let text = run(Log::from_columns("sine.csv", columns)).unwrap().warnings.join("\n");
+    assert!(!text.contains("fitted as a motion"), "{text}");
 }
 
 #[test]
