@@ -221,7 +221,8 @@ fn extreme_pairs_do_not_panic() {
         let mut pairs = even_pairs(&LEFT, 20, 0.001, 1);
         pairs[9] = FrictionPair { speed_rad_s: speed, torque_nm: torque };
         for bounds in [Bounds::Data, Bounds::Paper] {
-            let _ = fit_pairs(&pairs, "a.csv", &options(Method::Best, bounds, 1), &mut go_on);
+            let report = fit_pairs(&pairs, "a.csv", &options(Method::Best, bounds, 1), &mut go_on);
+            assert_eq!(report.is_err(), speed > 1e6 || torque > 1e6, "{speed} rad/s, {torque} N m");
             let range =
                 if bounds == Bounds::Data { SearchBox::from_pairs(&pairs) } else { SearchBox::paper() };
             assert!(polish_pairs(&pairs, &range).is_some(), "{speed} rad/s, {torque} N m");

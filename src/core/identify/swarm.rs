@@ -204,7 +204,7 @@ fn smallest(numbers: &[f64]) -> usize {
 }
 
 /// Uniform in [0, 1) with 53 bits; written out so that it stays the same whatever a random library does.
-fn uniform(random: &mut ChaCha8Rng) -> f64 {
+pub(super) fn uniform(random: &mut ChaCha8Rng) -> f64 {
     (random.next_u64() >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
 }
 

@@ -5,9 +5,10 @@ use std::io::BufReader;
 use std::ops::ControlFlow;
 
 use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{Rng, SeedableRng};
+use rand_chacha::rand_core::SeedableRng;
 
 use super::FrictionPair;
+use super::swarm::uniform;
 use crate::friction::{Stribeck, StribeckParameters};
 use crate::record::{ColumnMap, Log, ReadOptions, read_log};
 
@@ -40,7 +41,7 @@ impl Noise {
     }
 
     pub(super) fn uniform(&mut self) -> f64 {
-        (self.0.next_u64() >> 11) as f64 / (1u64 << 53) as f64
+        uniform(&mut self.0)
     }
 
     pub(super) fn normal(&mut self) -> f64 {
