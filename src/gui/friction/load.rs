@@ -5,7 +5,9 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use flqr_core::record::{ColumnMap, HealthFinding, Log, LogKind, ReadOptions, data_health, read_log};
+use flqr_core::record::{
+    ColumnMap, HealthFinding, Log, LogKind, ReadOptions, data_health, read_log, row_time_s,
+};
 
 use crate::job::{Job, Outcome, Reporter, Waker};
 
@@ -148,7 +150,7 @@ fn axis(log: &Log) -> Axis {
     };
     match log.column("time_s").filter(usable) {
         Some(time) => {
-            Axis { values: time.to_vec(), label: "time [s]", gap: 10.0 * median_step(time).unwrap_or(1.0) }
+            Axis { values: time.to_vec(), label: "time [s]", gap: 10.0 * row_time_s(time).unwrap_or(1.0) }
         }
         None => {
             Axis { values: (0..log.rows()).map(|row| row as f64).collect(), label: "row", gap: f64::INFINITY }
@@ -156,16 +158,6 @@ fn axis(log: &Log) -> Axis {
     }
 }
 
-fn median_step(time: &[f64]) -> Option<f64> {
-    let mut steps: Vec<f64> = time
-        .windows(2)
-        .map(|pair| pair[1] - pair[0])
-        .filter(|step| step.is_finite() && *step > 0.0)
-        .collect();
-    let middle = steps.len() / 2;
-    (!steps.is_empty()).then(|| *steps.select_nth_unstable_by(middle, f64::total_cmp).1)
-}
-
 fn rate_hz(log: &Log) -> Option<f64> {
-    median_step(log.column("time_s")?).map(f64::recip)
+    row_time_s(log.column("time_s")?).map(f64::recip)
 }

@@ -5,6 +5,7 @@
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
+use egui::accesskit::Role;
 use egui::{Event, Key, Modifiers, PointerButton, Pos2, Vec2, vec2};
 use egui_kittest::{Harness, kittest::Queryable};
 use flqr_core::model_file::{AxisModel, Model, Rig, presets};
@@ -197,6 +198,24 @@ fn a_negative_mass_is_refused_where_it_was_typed() {
     assert_eq!(state(&window)["gain"], before["gain"]);
     enter(&mut window, "body mass value", "15");
     assert_ne!(state(&window)["gain"], before["gain"]);
+}
+
+#[test]
+fn friction_and_limit_begin_with_those_of_the_papers_preset() {
+    let file = TempFile::new("begin.toml", "");
+    let model_path = Some(file.0.clone());
+    let mut window = open(WindowOptions { model_path, ..options(Tab::Tune) }, SIZE);
+    click(&mut window, "torque limit");
+    window.get_by_role_and_label(Role::CheckBox, "right").click();
+    window.run_steps(3);
+    window.key_press_modifiers(Modifiers::COMMAND, Key::S);
+    until(&mut window, "saving", |s| s["message"].as_str().is_some_and(|m| m.starts_with("Saved")));
+    let saved = Model::from_toml(&std::fs::read_to_string(&file.0).unwrap(), "saved").unwrap();
+    let (saved, paper) = (saved.robot().unwrap(), presets::paper());
+    let paper = paper.robot().unwrap();
+    assert_eq!(saved.torque_limit_nm, paper.torque_limit_nm);
+    assert!(saved.torque_limit_nm.is_some());
+    assert_eq!(saved.friction[1], paper.friction[0]);
 }
 
 #[test]

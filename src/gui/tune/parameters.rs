@@ -1,8 +1,11 @@
 //! Parameters of the model. A field keeps what was typed; only what the core accepts reaches the session.
 
+use std::sync::LazyLock;
+
 use egui::{CollapsingHeader, Grid, Ui};
 use flqr_core::ParameterError;
 use flqr_core::friction::{Stribeck, StribeckParameters};
+use flqr_core::model_file::presets;
 use flqr_core::robot::RobotParameters;
 
 use crate::command::Command;
@@ -10,17 +13,20 @@ use crate::context::ViewContext;
 use crate::session::Session;
 use crate::widgets::{error_ui, hint_ui, number_ui, section_ui};
 
-/// What a curve begins with when a motor without friction gets one: the left motor of the paper's table 4.
-const FIRST_CURVE: StribeckParameters = StribeckParameters {
-    coulomb_nm: 0.0338,
-    static_nm: 0.0761,
-    viscous_nm_s_rad: 4.9e-4,
-    stribeck_speed_rad_s: 1.612,
-    stribeck_exponent: 0.231,
-    offset_nm: -0.0016,
-};
+/// What a motor without friction or limit begins with: the left motor of the paper's preset.
+struct FirstValues {
+    curve: StribeckParameters,
+    torque_limit_nm: f64,
+}
 
-const FIRST_LIMIT_NM: f64 = 2.42;
+static FIRST_VALUES: LazyLock<FirstValues> = LazyLock::new(|| {
+    let paper = presets::paper();
+    let values = paper.robot().and_then(|robot| {
+        let [left, _] = robot.friction;
+        Some(FirstValues { curve: *left?.parameters(), torque_limit_nm: robot.torque_limit_nm? })
+    });
+    values.expect("the paper's preset has friction and a torque limit, as a test of this page finds")
+});
 
 /// What has been typed.
 pub(super) struct ParameterEditor {
@@ -104,7 +110,7 @@ impl ParameterEditor {
             let mut limited = self.torque_limit_nm.is_some();
             let help = "Largest torque of one motor; without it the simulated motors are unlimited";
             if ui.checkbox(&mut limited, "torque limit").on_hover_text(help).changed() {
-                self.torque_limit_nm = limited.then_some(FIRST_LIMIT_NM);
+                self.torque_limit_nm = limited.then(|| FIRST_VALUES.torque_limit_nm);
             }
             if let Some(limit) = &mut self.torque_limit_nm {
                 number_ui(ui, limit, "torque limit value", 64.0);
@@ -127,7 +133,7 @@ impl ParameterEditor {
                 let mut present = self.friction[motor].is_some();
                 let help = format!("Whether the {name} motor has friction");
                 if ui.checkbox(&mut present, name).on_hover_text(help).changed() {
-                    self.friction[motor] = present.then_some(FIRST_CURVE);
+                    self.friction[motor] = present.then(|| FIRST_VALUES.curve);
                 }
             }
             ui.end_row();
