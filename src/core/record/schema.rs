@@ -23,7 +23,7 @@ pub const BENCH: &[&str] = &["time_s", "motor_angle_rad", "torque_nm"];
 /// Required columns of a linear axis log.
 pub const LINEAR_AXIS: &[&str] = &["time_s", "position_m", "force_n"];
 /// Required columns of a robot log.
-pub const ROBOT: &[&str] = &[
+pub const ROBOT: [&str; 11] = [
     "time_s",
     "x_m",
     "x_dot_m_s",
@@ -58,7 +58,7 @@ impl LogKind {
         match self {
             Self::Bench => BENCH,
             Self::LinearAxis => LINEAR_AXIS,
-            Self::Robot => ROBOT,
+            Self::Robot => &ROBOT,
             Self::FrictionPairs => FRICTION_PAIRS,
         }
     }

@@ -1,5 +1,7 @@
 //! One row of the simulated robot's recorder.
 
+use crate::record::schema;
+
 /// What the robot's recorder writes at one tick: measured values, and the torque that was asked of the
 /// motors. The columns are those of a robot log.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,19 +32,7 @@ pub struct Sample {
 
 impl Sample {
     /// Names of the columns of a robot log, in the order of [`Sample::to_row`].
-    pub const COLUMNS: [&'static str; 11] = [
-        "time_s",
-        "x_m",
-        "x_dot_m_s",
-        "pitch_rad",
-        "pitch_rate_rad_s",
-        "motor_angle_left_rad",
-        "motor_angle_right_rad",
-        "motor_speed_left_rad_s",
-        "motor_speed_right_rad_s",
-        "torque_left_nm",
-        "torque_right_nm",
-    ];
+    pub const COLUMNS: [&'static str; 11] = schema::ROBOT;
 
     /// The values in the order of [`Sample::COLUMNS`].
     pub fn to_row(&self) -> [f64; 11] {
