@@ -3,6 +3,9 @@
 use super::{Findings, Severity};
 use crate::record::{Log, row_time_s};
 
+/// A step of time longer than so many usual ones is a gap.
+pub(super) const GAP_ROWS: f64 = 5.5;
+
 /// Reports on `time_s` and returns the usual time between rows, s, where there is one.
 pub(super) fn check(log: &Log, findings: &mut Findings) -> Option<f64> {
     let time = log.column("time_s")?;
@@ -72,7 +75,7 @@ fn jitter(row_s: f64, sorted: &[f64], findings: &mut Findings) {
 }
 
 fn gaps(row_s: f64, time: &[f64], findings: &mut Findings) {
-    let is_gap = |pair: &&[f64]| pair[1] - pair[0] > 5.5 * row_s;
+    let is_gap = |pair: &&[f64]| pair[1] - pair[0] > GAP_ROWS * row_s;
     let gaps: Vec<&[f64]> = time.windows(2).filter(is_gap).collect();
     let longest = gaps.iter().max_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0])));
     if let Some(longest) = longest {

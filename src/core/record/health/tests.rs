@@ -176,6 +176,19 @@ fn each_fault_is_named_with_its_column_and_mend() {
     }
 }
 
+/// A recorder that pauses while the motor goes on: the speed is not to blame.
+#[test]
+fn a_gap_in_time_is_no_fault_of_the_units() {
+    let bench = bench();
+    let mut paused = bench.clone();
+    for column in &mut paused.columns {
+        column.values.drain(1234..1934);
+    }
+    let findings = data_health(&paused);
+    let warnings: Vec<&HealthFinding> = findings.iter().filter(|f| f.severity > Severity::Info).collect();
+    assert!(matches!(warnings[..], [gap] if gap.problem.starts_with("gaps of more")), "{warnings:#?}");
+}
+
 #[test]
 fn columns_held_by_a_slower_sensor_are_told() {
     let bench = bench();

@@ -1,6 +1,6 @@
 //! Values that look like another unit than the name says.
 
-use super::{Findings, finite, range};
+use super::{Findings, clock::GAP_ROWS, finite, range};
 use crate::record::Log;
 
 /// Positions and the speeds that must be their derivatives.
@@ -91,6 +91,10 @@ fn speed_factor(time: &[f64], position: &[f64], speed: &[f64], row_s: f64) -> Op
     let (mut both, mut moved, mut swept) = (0.0, 0.0, 0.0);
     for start in (0..time.len().saturating_sub(rows)).step_by(rows) {
         let end = start + rows;
+        // Over a gap the motion went on unseen.
+        if time[start..=end].windows(2).any(|pair| pair[1] - pair[0] > GAP_ROWS * row_s) {
+            continue;
+        }
         let change = position[end] - position[start];
         let step = |row: usize| 0.5 * (speed[row] + speed[row + 1]) * (time[row + 1] - time[row]);
         let integral: f64 = (start..end).map(step).sum();
