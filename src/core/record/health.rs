@@ -3,6 +3,7 @@
 mod clock;
 mod excitation;
 mod signals;
+mod spikes;
 mod units;
 
 use serde::Serialize;
@@ -49,6 +50,10 @@ impl std::fmt::Display for HealthFinding {
     }
 }
 
+/// Positions as a sensor measures them.
+const POSITIONS: [&str; 5] =
+    ["motor_angle_rad", "motor_angle_left_rad", "motor_angle_right_rad", "position_m", "x_m"];
+
 /// The findings so far.
 #[derive(Default)]
 struct Findings(Vec<HealthFinding>);
@@ -75,7 +80,7 @@ impl Findings {
 /// What is wrong with a log, the gravest first.
 ///
 /// Looks at completeness, dropped rows, the clock (rate, jitter, gaps, order), each column of the schema
-/// (missing values, held samples, steps, saturation, standstill, wrapped angles), units (degrees, revolutions,
+/// (missing values, held samples, steps, saturation, standstill, wrapped angles, spikes), units (degrees, revolutions,
 /// raw counts) and at what the motion excites. A log without faults has infos only.
 pub fn data_health(log: &Log) -> Vec<HealthFinding> {
     let mut findings = Findings::default();
@@ -85,6 +90,11 @@ pub fn data_health(log: &Log) -> Vec<HealthFinding> {
         let row_s = clock::check(log, &mut findings);
         for column in log.columns.iter().filter(|column| schema::is_known(&column.name)) {
             signals::check(&column.name, &column.values, row_s, &mut findings);
+        }
+        if let Some(row_s) = row_s {
+            for name in POSITIONS {
+                spikes::check(log, name, row_s, &mut findings);
+            }
         }
         units::check(log, row_s, &mut findings);
         if let Some(kind) = kind {

@@ -54,6 +54,27 @@ pub struct Log {
     pub problems: Vec<LineProblem>,
     /// All problems, those beyond the kept ones included.
     pub problem_count: usize,
+    /// Where the rows stand in the file; empty for a log that was not read from one.
+    lines: RowLines,
+}
+
+/// Rows from which on the line number is the row's number plus an offset: (row, line − row).
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+struct RowLines(Vec<(usize, u64)>);
+
+impl RowLines {
+    /// Notes the line of the next row.
+    fn push(&mut self, row: usize, line: u64) {
+        let offset = line - row as u64;
+        if self.0.last().is_none_or(|&(_, last)| last != offset) {
+            self.0.push((row, offset));
+        }
+    }
+
+    fn line(&self, row: usize) -> Option<u64> {
+        let run = self.0.partition_point(|&(start, _)| start <= row).checked_sub(1)?;
+        Some(self.0[run].1 + row as u64)
+    }
 }
 
 impl Log {
@@ -75,6 +96,11 @@ impl Log {
     /// The values of a column; the first one of that name.
     pub fn column(&self, name: &str) -> Option<&[f64]> {
         self.columns.iter().find(|column| column.name == name).map(|column| column.values.as_slice())
+    }
+
+    /// Line of the file at which a row stands, from 1; nothing for a log that was not read from a file.
+    pub fn line(&self, row: usize) -> Option<u64> {
+        self.lines.line(row).filter(|_| row < self.rows())
     }
 
     /// Number of rows.

@@ -27,7 +27,8 @@ fn dialects_of_one_log_read_alike() {
         // Some recorders end every row with a comma.
         PLAIN.replace("1\n", "1,\n"),
     ] {
-        assert_eq!(read(&text, &[]).as_ref(), Ok(&plain), "{text:?}");
+        let log = read(&text, &[]).unwrap();
+        assert_eq!((&log.columns, log.problem_count), (&plain.columns, 0), "{text:?}");
     }
 }
 
@@ -192,6 +193,8 @@ fn isolated_damage_becomes_a_problem_with_line_and_column() {
         assert_eq!((log.dropped_rows, log.rows()), (dropped, 21 - dropped), "{damaged}");
         assert!(log.column("torque_nm").unwrap().iter().all(|value| value.is_finite()), "{damaged}");
     }
+    let late = read(format!("{header}{before}0.004,0.5,1,20\n{}", good(10, 11)), &[]).unwrap();
+    assert_eq!((late.line(9), late.line(10), late.line(19)), (Some(12), Some(14), Some(23)));
     // A slow sensor leaves cells empty between its values: no problem.
     let log = read(format!("{header}{before}0.010,0.5,1,\n0.011,0.5,1,nan\n"), &[]).unwrap();
     assert_eq!((log.problem_count, log.rows()), (0, 12));
@@ -276,6 +279,10 @@ fn lines_are_counted_across_comments_and_quoted_breaks() {
     // Header, 878 rows, 9 comments and one break inside a cell stand above it.
     assert_eq!(log.problems[0].line, 1 + 878 + 9 + 1 + 1);
     assert_eq!((log.rows(), log.column("torque_nm").unwrap()[777]), (999, 1.0));
+    for (row, line) in [(0, 3), (777, 787), (778, 789), (877, 889), (878, 891), (998, 1012)] {
+        assert_eq!(log.line(row), Some(line), "{row}");
+    }
+    assert_eq!(log.line(999), None);
 }
 
 #[test]

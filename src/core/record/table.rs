@@ -3,7 +3,7 @@
 use super::plan::{Need, Plan};
 use super::text::{Header, Row, for_each_cell};
 use super::time::{Misfits, misfits};
-use super::{Column, LineProblem, Log, LogError};
+use super::{Column, LineProblem, Log, LogError, RowLines};
 
 /// The columns read so far, and what was wrong with the rows.
 pub(super) struct Table {
@@ -12,8 +12,7 @@ pub(super) struct Table {
     columns: Vec<Vec<f64>>,
     /// Values of the row that is being read, by the file's columns.
     row: Vec<f64>,
-    /// Rows from which on the line number is the row's number plus this: (row, line − row).
-    lines: Vec<(usize, u64)>,
+    lines: RowLines,
     problems: Problems,
     dropped: usize,
     max_values: usize,
@@ -39,7 +38,7 @@ impl Table {
     pub(super) fn new(plan: Plan, header: Header, max_values: usize) -> Self {
         let columns = plan.targets.iter().map(|_| Vec::new()).collect();
         let row = vec![f64::NAN; header.names.len()];
-        let lines = Vec::new();
+        let lines = RowLines::default();
         Self { plan, header, columns, row, lines, problems: Problems::default(), dropped: 0, max_values }
     }
 
@@ -121,16 +120,12 @@ impl Table {
             let value = self.row[target.from] * target.factor;
             column.push(if value.is_finite() { value } else { f64::NAN });
         }
-        let offset = line - row as u64;
-        if self.lines.last().is_none_or(|&(_, last)| last != offset) {
-            self.lines.push((row, offset));
-        }
+        self.lines.push(row, line);
         Ok(())
     }
 
     fn line_of(&self, row: usize) -> u64 {
-        let run = self.lines.partition_point(|&(start, _)| start <= row) - 1;
-        self.lines[run].1 + row as u64
+        self.lines.line(row).expect("every kept row has its line")
     }
 
     /// The log, once every row is in.
@@ -151,7 +146,8 @@ impl Table {
         }
         let names = self.plan.targets.into_iter().map(|target| target.name);
         let columns = names.zip(self.columns).map(|(name, values)| Column { name, values }).collect();
-        Ok(Log { source: file.to_owned(), columns, dropped_rows, problems, problem_count })
+        let lines = self.lines;
+        Ok(Log { source: file.to_owned(), columns, dropped_rows, problems, problem_count, lines })
     }
 
     fn drop_rows_out_of_time(&mut self, file: &str) -> Result<(), LogError> {
@@ -173,6 +169,10 @@ impl Table {
                 format!("{time} s does not fit between the times around it, the row was dropped")
             });
         }
+        let mut lines: Vec<u64> = (0..self.kept()).map(|row| self.line_of(row)).collect();
+        remove_rows(&mut lines, &rows);
+        self.lines = RowLines::default();
+        lines.into_iter().enumerate().for_each(|(row, line)| self.lines.push(row, line));
         for values in &mut self.columns {
             remove_rows(values, &rows);
         }
@@ -190,7 +190,7 @@ fn mend(from_s: f64, to_s: f64) -> &'static str {
 }
 
 /// Removes rows, given in rising order.
-fn remove_rows(values: &mut Vec<f64>, rows: &[usize]) {
+fn remove_rows<T>(values: &mut Vec<T>, rows: &[usize]) {
     let mut rest = rows.iter().peekable();
     let mut index = 0;
     values.retain(|_| {

@@ -109,7 +109,14 @@ fn wraps(name: &str, values: &[f64], findings: &mut Findings) {
         let turns = (pair[1] - pair[0]) / TAU;
         turns.abs() > 0.9 && (turns - turns.round()).abs() < 0.1
     };
-    let wrapped = values.windows(2).filter(jump).count();
+    // A value that comes back at once is a spike.
+    let returns = |rows: &[f64]| (rows[2] - rows[0]).abs() < 0.5 * (rows[1] - rows[0]).abs();
+    let spike = |row: usize| {
+        values.get(row..row + 3).is_some_and(returns)
+            || row.checked_sub(1).and_then(|before| values.get(before..before + 3)).is_some_and(returns)
+    };
+    let pairs = values.windows(2).enumerate();
+    let wrapped = pairs.filter(|(row, pair)| jump(pair) && !spike(*row)).count();
     let inside = finite(values).all(|angle| angle.abs() < 1.1 * TAU);
     if wrapped > 0 && inside {
         let problem = format!("the angle jumps by a whole turn {wrapped} times: it is given within one turn");

@@ -189,6 +189,36 @@ fn a_gap_in_time_is_no_fault_of_the_units() {
     assert!(matches!(warnings[..], [gap] if gap.problem.starts_with("gaps of more")), "{warnings:#?}");
 }
 
+/// One value that is off and comes back, by whole turns and by little more than the noise of the sensor.
+#[test]
+fn a_single_spike_in_position_is_found_with_its_time() {
+    let bench = bench();
+    for (row, size) in [(1, 2.0 * PI), (2000, 2.0 * PI), (2000, -0.01), (3998, 50.0)] {
+        let log = with(&bench, "motor_angle_rad", |at, q| q + size * f64::from(at == row));
+        let findings = data_health(&log);
+        let warnings: Vec<&HealthFinding> = findings.iter().filter(|f| f.severity > Severity::Info).collect();
+        let [spike] = warnings[..] else { panic!("{row} {size}: {warnings:#?}") };
+        assert_eq!(spike.column, "motor_angle_rad");
+        assert!(spike.problem.starts_with("one value is "), "{spike:?}");
+        assert!(spike.problem.ends_with(&format!(", at {} s", row as f64 * 1e-3)), "{spike:?}");
+        assert_eq!(spike.mend, "remove the row");
+    }
+    let slow = with(&bench, "motor_angle_rad", |row, q| 0.1 * q + 2.0 * PI * f64::from(row == 700));
+    assert!(data_health(&slow).iter().all(|f| !f.problem.contains("whole turn")));
+    let two = with(&bench, "motor_angle_rad", |row, q| q + f64::from(row == 900 || row == 1900));
+    let found = &data_health(&two)[0].problem;
+    assert!(found.starts_with("2 single values") && found.ends_with("at 0.9 s"), "{found}");
+    // A jump that stays, a rest with a flickering last digit and a hard stop are no spikes.
+    for harmless in [
+        with(&bench, "motor_angle_rad", |row, q| q + f64::from(row > 2000)),
+        with(&bench, "motor_angle_rad", |row, q| if row > 500 { q } else { 1e-4 * f64::from(row % 97 == 5) }),
+        with(&bench, "motor_angle_rad", |row, _| (row as f64 * 1e-3 - 2.0).abs()),
+    ] {
+        let findings = data_health(&harmless);
+        assert!(findings.iter().all(|f| !f.problem.contains("the rows around")), "{findings:#?}");
+    }
+}
+
 #[test]
 fn columns_held_by_a_slower_sensor_are_told() {
     let bench = bench();
@@ -248,9 +278,14 @@ fn dropped_rows_are_never_silent() {
     );
 }
 
-/// A shared log and its findings, or nothing where the data are absent and not required.
-#[expect(clippy::disallowed_methods, reason = "measured data are read where they are at hand")]
+/// The findings of a shared log.
 fn shared(name: &str, map: &[&str]) -> Option<Vec<HealthFinding>> {
+    shared_log(name, map).map(|log| data_health(&log))
+}
+
+/// A shared log, or nothing where the data are absent and not required.
+#[expect(clippy::disallowed_methods, reason = "measured data are read where they are at hand")]
+fn shared_log(name: &str, map: &[&str]) -> Option<Log> {
     use crate::record::{ColumnMap, ReadOptions, read_log};
     let path = format!("{}/../../../shared/data/{name}", env!("CARGO_MANIFEST_DIR"));
     let Ok(file) = std::fs::File::open(&path) else {
@@ -261,7 +296,7 @@ fn shared(name: &str, map: &[&str]) -> Option<Vec<HealthFinding>> {
     let map = ColumnMap::new(map.iter().map(|entry| entry.parse().unwrap()).collect()).unwrap();
     let reader = std::io::BufReader::new(file);
     let mut quiet = |_| std::ops::ControlFlow::Continue(());
-    Some(data_health(&read_log(reader, name, &ReadOptions::new(&map), &mut quiet).unwrap()))
+    Some(read_log(reader, name, &ReadOptions::new(&map), &mut quiet).unwrap())
 }
 
 #[test]
@@ -274,6 +309,23 @@ fn simulated_logs_without_faults_have_infos_only() {
     }
     let Some(findings) = shared("emps/emps_standard.csv", &[]) else { return };
     assert!(findings.iter().all(|f| f.severity == Severity::Info), "{findings:#?}");
+}
+
+/// One sample of a measured log is moved, and found at its line.
+#[test]
+fn a_spike_in_a_measured_log_is_found() {
+    for (name, column, row, size) in [
+        ("emps/emps_standard.csv", "position_m", 12_345, 0.05),
+        ("undeclared/example-bench/log.csv", "motor_angle_rad", 9_876, 2.0 * PI),
+    ] {
+        let Some(log) = shared_log(name, &[]) else { return };
+        let log = with(&log, column, |at, value| value + size * f64::from(at == row));
+        let findings = data_health(&log);
+        let warnings: Vec<&HealthFinding> = findings.iter().filter(|f| f.severity > Severity::Info).collect();
+        let [spike] = warnings[..] else { panic!("{name}: {warnings:#?}") };
+        assert_eq!(spike.column, column);
+        assert!(spike.problem.ends_with(&format!("line {}", row + 2)), "{spike:?}");
+    }
 }
 
 /// What is odd about the measured logs, as their descriptions tell.
