@@ -89,7 +89,7 @@ fn each_fault_is_named_with_its_column_and_mend() {
             Warning,
             "motor_speed_rad_s",
             "the position in degrees",
-            "if the position is right",
+            "if so, read it with --map motor_angle_rad=motor_angle_rad*0.0174533",
         ),
         (
             with(&bench, "motor_speed_rad_s", |_, w| -w),
@@ -173,6 +173,51 @@ fn each_fault_is_named_with_its_column_and_mend() {
         assert!(findings.iter().any(|f| fits(&f)), "{problem}: {findings:#?}");
         let worse = findings.iter().filter(|f| f.severity > severity).count();
         assert_eq!(worse, 0, "{problem}: {findings:#?}");
+    }
+}
+
+#[test]
+fn the_map_of_a_unit_goes_to_the_column_that_is_off() {
+    let unit = |position: f64, speed: f64| {
+        let log = with(&bench(), "motor_angle_rad", |_, q| q * position);
+        let log = with(&log, "motor_speed_rad_s", |_, w| w * speed);
+        let findings = data_health(&log);
+        let warnings = findings.iter().filter(|f| f.severity > Severity::Info);
+        warnings.map(|f| (f.problem.clone(), f.mend.clone())).collect::<Vec<_>>()
+    };
+    let (degrees, rpm) = (180.0 / PI, 30.0 / PI);
+    let [(_, mend)] = &unit(degrees, 1.0)[..] else { panic!("one finding") };
+    assert_eq!(mend, "if so, read it with --map motor_angle_rad=motor_angle_rad*0.0174533");
+    let [(_, mend)] = &unit(1.0, degrees)[..] else { panic!("one finding") };
+    assert_eq!(mend, "if so, read it with --map motor_speed_rad_s=motor_speed_rad_s*0.0174533");
+    let [(problem, mend)] = &unit(degrees, rpm)[..] else { panic!("one finding") };
+    assert!(problem.contains("revolutions per minute against a position in degrees or a gear"), "{problem}");
+    let both =
+        "--map motor_angle_rad=motor_angle_rad*0.0174533 --map motor_speed_rad_s=motor_speed_rad_s*0.1047198";
+    assert!(mend.contains(both), "{mend}");
+    let [(problem, mend)] = &unit(1.0 / (2.0 * PI), rpm)[..] else { panic!("one finding") };
+    assert!(problem.contains("against a position in revolutions"), "{problem}");
+    assert!(mend.contains("motor_angle_rad*6.2831853 --map motor_speed_rad_s=motor_speed_rad_s*0.1047198"));
+    let [(_, mend)] = &unit(1.0, 3.0)[..] else { panic!("one finding") };
+    assert!(
+        mend.contains("if the position is right, --map motor_speed_rad_s=motor_speed_rad_s*0.33"),
+        "{mend}"
+    );
+    let other = "; if the speed is right, --map motor_angle_rad=motor_angle_rad*";
+    let factor: f64 = mend.split(other).nth(1).unwrap().parse().unwrap();
+    assert!((factor - 3.0).abs() < 0.05, "{mend}");
+}
+
+/// A time in another unit is told once, and a speed that is off besides keeps its own finding.
+#[test]
+fn a_time_in_milliseconds_is_no_fault_of_the_speed() {
+    for unit in [1e3, 1e6] {
+        let log = with(&bench(), "time_s", |_, t| t * unit);
+        let findings = data_health(&log);
+        let warnings: Vec<&HealthFinding> = findings.iter().filter(|f| f.severity > Severity::Info).collect();
+        assert!(matches!(warnings[..], [time] if time.column == "time_s"), "{warnings:#?}");
+        let findings = data_health(&with(&log, "motor_speed_rad_s", |_, w| w * 180.0 / PI));
+        assert!(findings.iter().any(|f| f.problem.contains("degrees per second")), "{findings:#?}");
     }
 }
 
