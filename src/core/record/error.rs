@@ -41,6 +41,12 @@ pub enum LogError {
         /// What the system said.
         problem: String,
     },
+    /// A folder in place of a file.
+    #[error("{file} is a folder: give the CSV file in it")]
+    Folder {
+        /// The folder.
+        file: String,
+    },
     /// The caller said stop.
     #[error("{file}: reading was cancelled at line {line}, nothing was kept")]
     Cancelled {

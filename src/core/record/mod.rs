@@ -140,7 +140,7 @@ impl Log {
             kind,
             missing: missing.join("`, `"),
             present: listed(&names),
-            example: map_example(missing.first().copied().unwrap_or("torque_nm"), &names),
+            example: map_example(&missing, &names),
         }
     }
 }
@@ -155,18 +155,51 @@ fn listed(names: &[&str]) -> String {
     text
 }
 
-/// A column map entry with the file's column that shares most words with a missing one.
-fn map_example(missing: &str, present: &[&str]) -> String {
-    let words = |name: &str| {
-        name.to_lowercase().split(|c: char| !c.is_alphanumeric()).map(str::to_owned).collect::<Vec<_>>()
-    };
-    let wanted = words(missing);
-    let shared = |name: &str| words(name).iter().filter(|word| wanted.contains(word)).count();
-    let mut best = ("COLUMN", 0);
-    for &name in present.iter().filter(|name| !schema::is_known(name)) {
-        if shared(name) > best.1 {
-            best = (name, shared(name));
+/// Column map entries for the missing columns that one of the file's columns resembles, each of the file's
+/// columns once; up to two columns without one keep a place to fill in.
+fn map_example(missing: &[&str], present: &[&str]) -> String {
+    let mut free: Vec<&str> = present.iter().copied().filter(|name| !schema::is_known(name)).collect();
+    let (mut entries, mut matched) = (Vec::new(), 0);
+    for name in missing {
+        let resembles = |other: &usize| resemblance(name, free[*other]);
+        // The first of equals.
+        let best = (0..free.len()).rev().max_by_key(resembles).filter(|best| resembles(best).1 > 0);
+        matched += usize::from(best.is_some());
+        let theirs = best.map_or("COLUMN", |best| free.remove(best));
+        entries.push(format!("{name}={theirs}"));
+    }
+    if missing.len() > 2 {
+        if matched > 0 {
+            entries.retain(|entry| !entry.ends_with("=COLUMN"));
+        } else {
+            entries.truncate(1);
         }
     }
-    format!("{missing}={}", best.0)
+    entries.join(" --map ")
+}
+
+/// How much a file's column is like one of ours: whether it is a measured one, and what they have in
+/// common, a unit counting half a word.
+fn resemblance(ours: &str, theirs: &str) -> (bool, usize) {
+    const UNITS: [&str; 8] = ["rad_s", "m_s", "rad", "nm", "m", "s", "n", "c"];
+    const WISHED: [&str; 9] =
+        ["goal", "ref", "reference", "target", "cmd", "command", "desired", "des", "setpoint"];
+    const PLACES: [&str; 3] = ["motor", "left", "right"];
+    let words = |name: &str| -> (Vec<String>, &'static str) {
+        let name = name.to_lowercase();
+        let unit = UNITS.into_iter().find(|unit| name.ends_with(&format!("_{unit}"))).unwrap_or("");
+        let stem = name.strip_suffix(unit).unwrap_or(&name);
+        let words = stem.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty());
+        (words.map(str::to_owned).collect(), unit)
+    };
+    let ((wanted, unit), (found, other_unit)) = (words(ours), words(theirs));
+    let common = |sort: bool| {
+        let of_sort = found.iter().filter(|word| PLACES.contains(&word.as_str()) == sort);
+        of_sort.filter(|word| wanted.contains(word)).count()
+    };
+    // Where it is measured tells two of a kind apart, not what it is.
+    let what = 2 * common(false) + usize::from(!unit.is_empty() && unit == other_unit);
+    let likeness = if what > 0 { 2 * what + common(true) } else { 0 };
+    let measured = !found.iter().any(|word| WISHED.contains(&word.as_str()));
+    (likeness > 0 && measured, likeness)
 }

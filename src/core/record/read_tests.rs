@@ -74,6 +74,27 @@ fn kinds_are_recognised() {
 }
 
 #[test]
+fn the_suggested_map_takes_measured_columns_for_all_that_miss() {
+    for (header, expected) in [
+        ("time_s,angle_goal_rad,angle_rad,torque_nm", "--map motor_angle_rad=angle_rad"),
+        ("time_s,angle_rad,angle_goal_rad,torque_nm", "--map motor_angle_rad=angle_rad"),
+        ("time_s,motor_angle_ref_rad,q_rad,torque_nm", "--map motor_angle_rad=q_rad"),
+        ("time_s,angle_goal_rad,torque_nm", "--map motor_angle_rad=angle_goal_rad"),
+        ("time_s,angle_goal_rad,angle_rad,tau_nm", "--map motor_angle_rad=angle_rad --map torque_nm=tau_nm"),
+        ("time_s,angle_rad,current_a", "--map motor_angle_rad=angle_rad --map torque_nm=COLUMN"),
+        ("time_s,wheel_speed_rad_s,torque_nm", "--map motor_angle_rad=COLUMN"),
+        (
+            "time_s,x_m,pitch_rad,pitch_rate,torque_left,torque_right",
+            "--map pitch_rate_rad_s=pitch_rate --map torque_left_nm=torque_left --map torque_right_nm=torque_right",
+        ),
+    ] {
+        let row = vec!["1"; header.split(',').count()].join(",");
+        let message = read(format!("{header}\n{row}\n"), &[]).unwrap().kind().unwrap_err().to_string();
+        assert!(message.ends_with(expected), "{header}: {message}");
+    }
+}
+
+#[test]
 fn a_map_reads_the_columns_of_the_file() {
     let text = "time_s,angle,torque_nm,current_a\n0,10,1,5\n1,20,2,6\n";
     let map = ["motor_angle_rad=angle*0.1", "torque_nm=torque_nm*6"];
@@ -334,6 +355,17 @@ fn a_reader_that_fails_is_reported() {
         message,
         "usb.csv: reading stopped after line 3 (cable pulled), check the disk or copy the file again"
     );
+}
+
+#[test]
+#[expect(clippy::disallowed_methods, reason = "only the system can say that it is a folder")]
+fn a_folder_is_called_a_folder() {
+    // Some systems refuse to open a folder at all.
+    let Ok(folder) = std::fs::File::open(env!("CARGO_MANIFEST_DIR")) else { return };
+    let map = ColumnMap::default();
+    let reader = std::io::BufReader::new(folder);
+    let result = read_log(reader, "runs", &ReadOptions::new(&map), &mut |_| ControlFlow::Continue(()));
+    assert_eq!(result.unwrap_err().to_string(), "runs is a folder: give the CSV file in it");
 }
 
 #[test]

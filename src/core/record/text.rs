@@ -73,7 +73,11 @@ impl<'a, R: BufRead> Lines<'a, R> {
     }
 
     fn io_error(&self, error: &io::Error) -> LogError {
-        LogError::Io { file: self.file.to_owned(), line: self.line, problem: error.to_string() }
+        let file = self.file.to_owned();
+        if error.kind() == io::ErrorKind::IsADirectory {
+            return LogError::Folder { file };
+        }
+        LogError::Io { file, line: self.line, problem: error.to_string() }
     }
 }
 
