@@ -89,7 +89,7 @@ pub fn data_health(log: &Log) -> Vec<HealthFinding> {
     if log.rows() > 0 {
         let row_s = clock::check(log, &mut findings);
         for column in log.columns.iter().filter(|column| schema::is_known(&column.name)) {
-            signals::check(&column.name, &column.values, row_s, &mut findings);
+            signals::check(log, &column.name, &column.values, row_s, &mut findings);
         }
         if let Some(row_s) = row_s {
             for name in POSITIONS {
@@ -124,13 +124,22 @@ fn kind(log: &Log, findings: &mut Findings) -> Option<LogKind> {
 
 fn dropped_rows(log: &Log, findings: &mut Findings) {
     let Some(first) = log.problems.first() else { return };
+    let unused = match log.problem_count {
+        1 => "1 cell or row".to_owned(),
+        count => format!("{count} cells or rows"),
+    };
+    let were = if log.dropped_rows == 1 { "was" } else { "were" };
+    let rows = rows(log.rows() + log.dropped_rows);
     let problem = format!(
-        "{} cells or rows could not be used and {} of {} rows were dropped, the first at {first}",
-        log.problem_count,
-        log.dropped_rows,
-        log.rows() + log.dropped_rows
+        "{unused} could not be used and {} of {rows} {were} dropped, the first at {first}",
+        log.dropped_rows
     );
     findings.warn(&first.column, problem, "correct the file where it is damaged, or record it again");
+}
+
+/// A number of rows in words.
+fn rows(count: usize) -> String {
+    if count == 1 { "1 row".to_owned() } else { format!("{count} rows") }
 }
 
 fn finite(values: &[f64]) -> impl Iterator<Item = f64> + Clone + '_ {

@@ -1,6 +1,6 @@
 //! The clock of a log.
 
-use super::{Findings, Severity};
+use super::{Findings, Severity, rows};
 use crate::record::{Log, row_time_s};
 
 /// A step of time longer than so many usual ones is a gap.
@@ -15,7 +15,9 @@ pub(super) fn check(log: &Log, findings: &mut Findings) -> Option<f64> {
     order(&steps, findings);
     let row_s = row_time_s(time)?;
     let seconds = sorted.iter().sum::<f64>();
-    findings.info("time_s", format!("{} rows a second over {seconds:.3} s", Number(1.0 / row_s)));
+    let rate_hz = Number(1.0 / row_s).to_string();
+    let unit = if rate_hz == "1" { "row" } else { "rows" };
+    findings.info("time_s", format!("{rate_hz} {unit} a second over {seconds:.3} s"));
     rate(row_s, findings);
     jitter(row_s, &sorted, findings);
     gaps(row_s, time, findings);
@@ -36,7 +38,7 @@ impl std::fmt::Display for Number {
 fn order(steps: &[f64], findings: &mut Findings) {
     let wrong = steps.iter().filter(|&&step| step <= 0.0).count();
     if wrong > 0 {
-        let problem = format!("time repeats or runs back in {wrong} rows");
+        let problem = format!("time repeats or runs back in {}", rows(wrong));
         findings.add(Severity::Error, "time_s", problem, "sort the rows by time and keep one for each time");
     }
 }

@@ -2,11 +2,12 @@
 
 use std::f64::consts::TAU;
 
-use super::{Findings, finite, range};
+use super::{Findings, finite, range, rows};
+use crate::record::Log;
 
 /// Reports on one column of the schema.
-pub(super) fn check(name: &str, values: &[f64], row_s: Option<f64>, findings: &mut Findings) {
-    missing(name, values, findings);
+pub(super) fn check(log: &Log, name: &str, values: &[f64], row_s: Option<f64>, findings: &mut Findings) {
+    missing(log, name, values, findings);
     if name == "time_s" || row_s.is_none() {
         return;
     }
@@ -39,12 +40,18 @@ pub(super) fn check(name: &str, values: &[f64], row_s: Option<f64>, findings: &m
     }
 }
 
-fn missing(name: &str, values: &[f64], findings: &mut Findings) {
+fn missing(log: &Log, name: &str, values: &[f64], findings: &mut Findings) {
     let absent = values.iter().filter(|value| !value.is_finite()).count();
     if absent == values.len() {
         findings.warn(name, "there is no number in this column", "remove the column or record it again");
     } else if absent > 0 {
-        findings.info(name, format!("{absent} of {} rows have no value", values.len()));
+        let first = values.iter().position(|value| !value.is_finite()).and_then(|row| log.line(row));
+        let place = first.map_or(String::new(), |line| match absent {
+            1 => format!(", at line {line}"),
+            _ => format!(", the first at line {line}"),
+        });
+        let have = if absent == 1 { "has" } else { "have" };
+        findings.info(name, format!("{absent} of {} {have} no value{place}", rows(values.len())));
     }
 }
 
@@ -119,7 +126,8 @@ fn wraps(name: &str, values: &[f64], findings: &mut Findings) {
     let wrapped = pairs.filter(|(row, pair)| jump(pair) && !spike(*row)).count();
     let inside = finite(values).all(|angle| angle.abs() < 1.1 * TAU);
     if wrapped > 0 && inside {
-        let problem = format!("the angle jumps by a whole turn {wrapped} times: it is given within one turn");
+        let times = if wrapped == 1 { "once".to_owned() } else { format!("{wrapped} times") };
+        let problem = format!("the angle jumps by a whole turn {times}: it is given within one turn");
         findings.warn(name, problem, "write the angle counted over turns");
     }
 }

@@ -53,7 +53,7 @@ fn each_fault_is_named_with_its_column_and_mend() {
             with(&bench, "time_s", |row, t| t - 0.01 * f64::from(row == 50)),
             Error,
             "time_s",
-            "in 1 rows",
+            "in 1 row",
             "sort",
         ),
         (
@@ -139,7 +139,7 @@ fn each_fault_is_named_with_its_column_and_mend() {
             with(&bench, "torque_nm", |row, t| if row == 7 { f64::NAN } else { t }),
             Info,
             "torque_nm",
-            "1 of 4000 rows have no value",
+            "1 of 4000 rows has no value",
             "",
         ),
         (
@@ -318,9 +318,47 @@ fn dropped_rows_are_never_silent() {
     assert_eq!(found.severity, Severity::Warning);
     assert_eq!(
         found.problem,
-        "2 cells or rows could not be used and 1 of 4001 rows were dropped, the first at line 7, column \
+        "2 cells or rows could not be used and 1 of 4001 rows was dropped, the first at line 7, column \
          `torque_nm`: bad"
     );
+}
+
+#[test]
+fn one_is_written_as_one() {
+    let log = Log {
+        dropped_rows: 1,
+        problem_count: 1,
+        problems: vec![crate::record::LineProblem { line: 7, column: String::new(), problem: "bad".into() }],
+        ..with(&bench(), "time_s", |row, _| row as f64)
+    };
+    let findings = data_health(&log);
+    let told = |text: &str| findings.iter().any(|f| f.problem.starts_with(text));
+    assert!(told("1 cell or row could not be used and 1 of 4001 rows was dropped"), "{findings:#?}");
+    assert!(told("1 row a second over 3999"), "{findings:#?}");
+}
+
+/// A value that the recorder wrote as NaN is told with its line, as text in its place is.
+#[test]
+fn missing_values_are_told_with_their_line() {
+    use crate::record::{ColumnMap, ReadOptions, read_log};
+    let row = |row: u32| {
+        let cell = if row == 30 || row == 40 { "NaN" } else { "20" };
+        format!("0.{row:03},0.{row},1,{cell}\n")
+    };
+    let header = "# made\ntime_s,motor_angle_rad,torque_nm,motor_temperature_c\n";
+    for (last, expected) in [
+        (36, "1 of 26 rows has no value, at line 23"),
+        (60, "2 of 50 rows have no value, the first at line 23"),
+    ] {
+        let text = header.to_owned() + &(10..last).map(row).collect::<String>();
+        let map = ColumnMap::default();
+        let mut quiet = |_| std::ops::ControlFlow::Continue(());
+        let log = read_log(text.as_bytes(), "run.csv", &ReadOptions::new(&map), &mut quiet).unwrap();
+        let findings = data_health(&log);
+        let found =
+            findings.iter().find(|f| f.column == "motor_temperature_c" && f.problem.contains("no value"));
+        assert_eq!(found.map(|f| f.problem.as_str()), Some(expected), "{findings:#?}");
+    }
 }
 
 /// The findings of a shared log.
