@@ -42,10 +42,17 @@ struct Status {
     is_error: bool,
 }
 
+/// How saving ended.
+enum Saved {
+    Written,
+    /// There is a file that is not the loaded one; it is as before.
+    AnotherIsThere,
+}
+
 /// A model file job: what it is for, and its result.
 enum ModelJob {
     Load(PathBuf, Job<(), Result<Model, String>>),
-    Save(PathBuf, Session, Job<(), Result<(), String>>),
+    Save(PathBuf, Session, Job<(), Result<Saved, String>>),
 }
 
 /// The window's content.

@@ -67,7 +67,10 @@ pub(crate) enum Command {
     ShowDialog(FilePurpose),
     LoadPreset(usize),
     LoadModel(PathBuf),
+    /// Saves; a file other than the loaded one is replaced only after a question.
     SaveModel(PathBuf),
+    /// Saves, whatever is there.
+    OverwriteModel(PathBuf),
     LoadLog(PathBuf),
     CancelLoad,
     StartFit,

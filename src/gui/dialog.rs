@@ -12,6 +12,16 @@ use crate::job::{Job, Waker};
 /// Nobody sees and cancels a dialog faster than this.
 const FASTEST_PERSON: Duration = Duration::from_millis(150);
 
+/// What to do where no dialog opens.
+fn instead(purpose: FilePurpose) -> &'static str {
+    match purpose {
+        FilePurpose::SaveModel => "type a path above and press Save",
+        FilePurpose::OpenModel | FilePurpose::OpenLog => {
+            "type the path instead, or drop the file onto the window"
+        }
+    }
+}
+
 /// What a dialog came back with.
 #[derive(Debug, PartialEq)]
 pub(crate) enum Answer {
@@ -37,7 +47,7 @@ impl Dialog {
 
 fn ask(purpose: FilePurpose, suggestion: &str) -> Answer {
     if let Some(problem) = missing_portal() {
-        return Answer::Unavailable(problem);
+        return Answer::Unavailable(format!("{problem}: {}.", instead(purpose)));
     }
     let start = Instant::now();
     let dialog = rfd::FileDialog::new();
@@ -48,21 +58,22 @@ fn ask(purpose: FilePurpose, suggestion: &str) -> Answer {
     };
     match chosen {
         Some(path) => Answer::Chosen(path),
-        None if start.elapsed() < FASTEST_PERSON => Answer::Unavailable(
-            "The desktop's file dialog did not open (its portal may be missing or broken): type the path instead, or drop the file onto the window.".to_owned(),
-        ),
+        None if start.elapsed() < FASTEST_PERSON => Answer::Unavailable(format!(
+            "The desktop's file dialog did not open (its portal may be missing or broken): {}.",
+            instead(purpose)
+        )),
         None => Answer::Cancelled,
     }
 }
 
 #[cfg(not(target_os = "linux"))]
-fn missing_portal() -> Option<String> {
+fn missing_portal() -> Option<&'static str> {
     None
 }
 
 /// Why there can be no dialog: no session bus, or nothing on it that offers one.
 #[cfg(target_os = "linux")]
-fn missing_portal() -> Option<String> {
+fn missing_portal() -> Option<&'static str> {
     let set = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty());
     let on_path = |program: &str| {
         set("PATH").is_some_and(|path| std::env::split_paths(&path).any(|dir| dir.join(program).is_file()))
@@ -73,14 +84,11 @@ fn missing_portal() -> Option<String> {
     let bus = set("DBUS_SESSION_BUS_ADDRESS").is_some()
         || set("XDG_RUNTIME_DIR").is_some_and(|dir| PathBuf::from(dir).join("bus").exists());
     if !bus {
-        return Some(
-            "There is no file dialog here (no session bus for a desktop portal): type the path instead, or drop the file onto the window.".to_owned(),
-        );
+        return Some("There is no file dialog here (no session bus for a desktop portal)");
     }
     let directories =
         set("XDG_DATA_DIRS").unwrap_or_else(|| std::ffi::OsString::from("/usr/local/share:/usr/share"));
     let service = "dbus-1/services/org.freedesktop.portal.Desktop.service";
-    (!std::env::split_paths(&directories).any(|dir| dir.join(service).is_file())).then(|| {
-        "There is no file dialog here (xdg-desktop-portal is not installed): type the path instead, or drop the file onto the window.".to_owned()
-    })
+    (!std::env::split_paths(&directories).any(|dir| dir.join(service).is_file()))
+        .then_some("There is no file dialog here (xdg-desktop-portal is not installed)")
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use egui::Context;
 use flqr_core::model_file::{Model, presets};
 
-use super::{App, ModelJob, Tab};
+use super::{App, ModelJob, Saved, Tab};
 use crate::command::{Command, FilePurpose, Source, Target};
 use crate::dialog::Dialog;
 use crate::friction::Fitted;
@@ -22,6 +22,8 @@ const HIDDEN_INTERVAL: std::time::Duration = std::time::Duration::from_millis(20
 pub(super) fn chosen(purpose: FilePurpose, path: PathBuf) -> Command {
     match purpose {
         FilePurpose::OpenModel => Command::LoadModel(path),
+        // The dialog has asked before replacing a file, though not about one with an extension added here.
+        FilePurpose::SaveModel if path.extension().is_some() => Command::OverwriteModel(path),
         FilePurpose::SaveModel => Command::SaveModel(path),
         FilePurpose::OpenLog => Command::LoadLog(path),
     }
@@ -89,7 +91,8 @@ impl App {
             Command::ShowDialog(purpose) => self.show_dialog(purpose),
             Command::LoadPreset(number) => self.load_preset(number),
             Command::LoadModel(path) => self.load_model(path),
-            Command::SaveModel(path) => self.save_model(path),
+            Command::SaveModel(path) => self.save_model(path, false),
+            Command::OverwriteModel(path) => self.save_model(path, true),
             Command::LoadLog(path) => self.load_log(&path),
             Command::CancelLoad => self.friction.cancel_load(),
             Command::StartFit => self.start_fit(),
@@ -204,14 +207,19 @@ impl App {
         }
     }
 
-    fn save_model(&mut self, path: PathBuf) {
+    /// Replaces the file that was loaded, and another one only if `replace`.
+    fn save_model(&mut self, path: PathBuf, replace: bool) {
         if self.model_file_is_busy() {
             return;
         }
         let path = if path.extension().is_none() { path.with_extension("toml") } else { path };
+        let replace = replace || self.model_path.as_ref() == Some(&path);
         let (file, text) = (path.clone(), self.session.model().to_toml());
         let write = move |_: &crate::job::Reporter<()>| {
-            crate::write_file::write_file(&file, &text).map_err(|error| {
+            if !replace && file.symlink_metadata().is_ok() {
+                return Ok(Saved::AnotherIsThere);
+            }
+            crate::write_file::write_file(&file, &text).map(|()| Saved::Written).map_err(|error| {
                 format!("{} could not be saved: {error}; nothing was changed", file.display())
             })
         };
@@ -235,7 +243,11 @@ impl App {
             },
             Some(ModelJob::Save(path, session, mut job)) => match job.poll().1 {
                 Outcome::Running => self.model_job = Some(ModelJob::Save(path, session, job)),
-                Outcome::Done(Ok(())) => self.note_saved(path, session),
+                Outcome::Done(Ok(Saved::Written)) => self.note_saved(path, session),
+                Outcome::Done(Ok(Saved::AnotherIsThere)) => {
+                    self.say(format!("{} exists and was not replaced.", path.display()));
+                    self.tune.ask_to_overwrite(path);
+                }
                 Outcome::Done(Err(problem)) => {
                     self.tune.note_file_problem(&problem);
                     self.fail(problem);

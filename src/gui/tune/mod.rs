@@ -8,7 +8,7 @@ mod parameters;
 mod predicted;
 mod weights;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use egui::{CentralPanel, Frame, Margin, Panel, ScrollArea, Ui};
 
@@ -69,6 +69,10 @@ impl TuneTab {
 
     pub(crate) fn note_file_problem(&mut self, problem: &str) {
         self.files.problem = Some(problem.to_owned());
+    }
+
+    pub(crate) fn ask_to_overwrite(&mut self, path: PathBuf) {
+        self.files.overwrite = Some(path);
     }
 
     pub(crate) fn note_saved(&mut self, path: &Path) {
