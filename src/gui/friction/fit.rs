@@ -31,6 +31,10 @@ pub(super) struct FitRun {
     bounds: Bounds,
     seed: u64,
     estimate: String,
+    /// Whether parameters that are not estimated are held at the open model's values.
+    from_model: bool,
+    /// `from_model` of the fit that runs or has ended.
+    pub(super) held: bool,
     job: Option<Job<Step, Result<FitReport, String>>>,
     /// Iteration and log10 of the best error, for the plot.
     pub(super) convergence: Vec<[f64; 2]>,
@@ -47,6 +51,8 @@ impl Default for FitRun {
             bounds: Bounds::Data,
             seed: 1,
             estimate: String::new(),
+            from_model: false,
+            held: false,
             job: None,
             convergence: Vec::new(),
             last_step: None,
@@ -70,7 +76,8 @@ impl FitRun {
     pub(super) fn start(&mut self, loaded: &LoadedLog, model: Model, waker: &Waker) -> Result<(), String> {
         self.discard();
         let log = Arc::clone(&loaded.log);
-        let model = fitting_model(loaded.kind.as_ref().ok().copied(), model);
+        let model = fitting_model(loaded.kind.as_ref().ok().copied(), model).filter(|_| self.from_model);
+        self.held = model.is_some();
         let motor = self.motor;
         let options = FitOptions {
             method: self.method,
@@ -237,9 +244,14 @@ impl FitRun {
         ui.end_row();
         ui.label("estimate");
         let field = TextEdit::singleline(&mut self.estimate).hint_text("default").desired_width(180.0);
-        ui.add(field).accessible_name("parameters to estimate").on_hover_text(
+        let field = ui.add(field).accessible_name("parameters to estimate");
+        field.on_hover_text(
             "Which parameters to free in a fit from motion: “all”, or names as in the model file, separated by commas. Empty: those that the log determines",
         );
+        ui.end_row();
+        ui.label("");
+        ui.checkbox(&mut self.from_model, "start from the open model")
+            .on_hover_text("Parameters that are not estimated are held at the model's values");
         ui.end_row();
     }
 

@@ -2,6 +2,7 @@
 
 use egui::{Grid, RichText, Ui};
 use flqr_core::identify::{Estimate, FitReport, StopReason};
+use flqr_core::record::Severity;
 
 use super::fit::FitRun;
 use crate::command::{Command, Target};
@@ -32,7 +33,7 @@ pub(super) fn ui(context: &ViewContext<'_>, fit: &FitRun, ui: &mut Ui) {
         hint_ui(ui, "The parameters appear here, each with its 95 % interval, once a fit has ended.");
         return;
     };
-    parameters_ui(report, ui);
+    parameters_ui(report, fit.held, ui);
     ui.add_space(4.0);
     hint_ui(
         ui,
@@ -49,10 +50,24 @@ pub(super) fn ui(context: &ViewContext<'_>, fit: &FitRun, ui: &mut Ui) {
     for warning in &report.warnings {
         warning_ui(ui, warning);
     }
-    for finding in &report.data_health {
-        warning_ui(ui, format!("{}: {} → {}", finding.column, finding.problem, finding.mend));
-    }
+    findings_ui(report, ui);
     use_ui(context, fit, ui);
+}
+
+/// What the fit says about the log, each once; the health of the log may say the same in a warning.
+fn findings_ui(report: &FitReport, ui: &mut Ui) {
+    for (index, finding) in report.data_health.iter().enumerate() {
+        if report.data_health[..index].contains(finding) || report.warnings.contains(&finding.problem) {
+            continue;
+        }
+        let column = if finding.column.is_empty() { String::new() } else { format!("{}: ", finding.column) };
+        let mend = if finding.mend.is_empty() { String::new() } else { format!(" → {}", finding.mend) };
+        let text = format!("{column}{}{mend}", finding.problem);
+        match finding.severity {
+            Severity::Info => hint_ui(ui, text),
+            Severity::Warning | Severity::Error => warning_ui(ui, text),
+        };
+    }
 }
 
 fn stop_text(stop: StopReason) -> &'static str {
@@ -78,7 +93,8 @@ fn in_order(report: &FitReport) -> Vec<(&'static str, &'static str, &'static str
     rows.into_iter().map(|(_, row)| row).collect()
 }
 
-fn parameters_ui(report: &FitReport, ui: &mut Ui) {
+fn parameters_ui(report: &FitReport, held: bool, ui: &mut Ui) {
+    let without_interval = if held { "held" } else { "none" };
     Grid::new("parameters").num_columns(3).striped(true).spacing([14.0, 5.0]).show(ui, |ui| {
         hint_ui(ui, "parameter");
         hint_ui(ui, "value");
@@ -89,7 +105,7 @@ fn parameters_ui(report: &FitReport, ui: &mut Ui) {
             ui.add(egui::Label::new(RichText::new(text).small()).extend()).on_hover_text(key);
             ui.label(mono(shown(estimate.value, 4)));
             let interval = estimate.ci95.map_or_else(
-                || "none".to_owned(),
+                || without_interval.to_owned(),
                 |[low, high]| format!("{}\n{}", shown(low, 4), shown(high, 4)),
             );
             ui.label(mono(interval).small());
