@@ -118,8 +118,8 @@ fn open(options: WindowOptions, opening: &std::sync::atomic::AtomicBool) -> efra
     let mut viewport = egui::ViewportBuilder::default()
         .with_title("flqr")
         .with_app_id("flqr")
-        .with_inner_size([1280.0, 800.0])
-        .with_min_inner_size([640.0, 420.0])
+        .with_inner_size([1240.0, 720.0])
+        .with_min_inner_size([1000.0, 640.0])
         .with_drag_and_drop(true);
     if let Ok(icon) = eframe::icon_data::from_png_bytes(ICON) {
         viewport = viewport.with_icon(icon);
