@@ -33,7 +33,14 @@ pub(super) struct Predicted {
 
 impl Predicted {
     pub(super) fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
-        let Some(new) = context.designer.in_force else { return };
+        let Some(new) = context.designer.in_force else {
+            // Filled, or the panel would shrink and stay so.
+            let size = ui.available_size();
+            ui.label(egui::RichText::new("Predicted").heading().strong());
+            crate::widgets::hint_ui(ui, "no design");
+            ui.set_min_size(size);
+            return;
+        };
         let old = context.designer.reference.filter(|reference| reference.design != new.design);
         let seconds = duration_s(&new).max(old.as_ref().map_or(0.0, duration_s));
         self.new.update(context, &new, seconds);
