@@ -63,6 +63,8 @@ pub struct App {
     model_path: Option<PathBuf>,
     tab: Tab,
     source: Source,
+    /// What the simulated robot goes back to when it is shown again.
+    paused_before_can: bool,
     designer: Designer,
     live: Live,
     history: History,
@@ -101,6 +103,7 @@ impl App {
             model_path: options.model_path,
             tab: options.tab,
             source: Source::default(),
+            paused_before_can: options.paused,
             designer: Designer::default(),
             live: Live::start(&waker, options.paused)?,
             history: History::default(),

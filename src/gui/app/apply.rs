@@ -116,8 +116,12 @@ impl App {
         self.source = source;
         self.set_live_interval();
         match source {
-            Source::Simulated => self.say("The plots show the simulated robot."),
+            Source::Simulated => {
+                self.live.send(LiveCommand::Pause(self.paused_before_can));
+                self.say("The plots show the simulated robot.");
+            }
             Source::Can => {
+                self.paused_before_can = self.live.status.paused;
                 self.live.send(LiveCommand::Pause(true));
                 self.say("CAN is not connected; the simulated robot is paused.");
             }

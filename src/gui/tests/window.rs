@@ -229,6 +229,7 @@ fn can_is_honest_about_being_not_connected() {
     assert!(window.query_by_label("Push").is_none(), "no controls of the simulated robot");
     click(&mut window, "Back to the simulated robot");
     window.get_by_label("Push");
+    until(&mut window, "running on", |s| s["simulation"]["paused"] == false);
 }
 
 #[test]
