@@ -27,7 +27,13 @@ fn symmetric_ui<const N: usize>(
     matrix: &mut SMatrix<f64, N, N>,
 ) {
     egui::Grid::new(letter).spacing([4.0, 4.0]).show(ui, |ui| {
+        ui.label("");
+        for name in names {
+            hint_ui(ui, name);
+        }
+        ui.end_row();
         for (row, row_name) in names.iter().enumerate() {
+            hint_ui(ui, *row_name);
             for (column, column_name) in names.iter().enumerate() {
                 let mut value = matrix[(row, column)];
                 if entry_ui(context, ui, &mut value, &format!("{letter} {row_name}, {column_name}")) {
@@ -42,7 +48,7 @@ fn symmetric_ui<const N: usize>(
 
 fn entry_ui(context: &ViewContext<'_>, ui: &mut Ui, value: &mut f64, name: &str) -> bool {
     let before = *value;
-    let field = number_ui(ui, value, name, 62.0).on_hover_text(name);
+    let field = number_ui(ui, value, name, 46.0).on_hover_text(name);
     if field.drag_started() || field.gained_focus() {
         context.commands.send(Command::BeginWeightDrag);
     }
