@@ -1,6 +1,6 @@
 //! Single positions far off the motion around them, as a lost bit or a glitch of a counter leaves them.
 
-use super::{Findings, clock::GAP_ROWS};
+use super::Findings;
 use crate::record::Log;
 
 /// A spike is farther off the rows around it than this, in robust standard deviations or smallest steps of
@@ -36,7 +36,8 @@ pub(super) fn check(log: &Log, name: &str, row_s: f64, findings: &mut Findings) 
 fn spikes(time: &[f64], values: &[f64], row_s: f64) -> Vec<(usize, f64)> {
     let off: Vec<f64> = time.windows(3).zip(values.windows(3)).map(|(t, v)| deviation(t, v)).collect();
     let floor = SIGMAS * spread(&off).max(smallest_step(values));
-    let gap = |pair: &[f64]| pair[1] - pair[0] > GAP_ROWS * row_s;
+    // A row that is stamped late looks off too where the motion is fast.
+    let uneven = |pair: &[f64]| (pair[1] - pair[0] - row_s).abs() > 0.5 * row_s;
     let spike = |&index: &usize| {
         let size = off[index].abs();
         // A row that returns pulls both neighbours half as far the other way, a step does not. Row 1 and the
@@ -46,7 +47,7 @@ fn spikes(time: &[f64], values: &[f64], row_s: f64) -> Vec<(usize, f64)> {
             && returns(index.checked_sub(1).and_then(|before| off.get(before)))
             && returns(off.get(index + 1))
             && size > BEYOND_NEIGHBOURS * nearby(&off, index)
-            && !time[index.saturating_sub(1)..time.len().min(index + 4)].windows(2).any(gap)
+            && !time[index.saturating_sub(1)..time.len().min(index + 4)].windows(2).any(uneven)
     };
     (0..off.len()).filter(spike).map(|index| (index + 1, off[index])).collect()
 }
