@@ -16,15 +16,20 @@ const DEFAULT_SPEED_RAD_S: f64 = 50.0;
 const POINTS_PER_SIDE: usize = 300;
 
 pub(super) fn ui(context: &ViewContext<'_>, fit: &FitRun, kind: Option<LogKind>, ui: &mut Ui) {
-    section_ui(ui, "Fitted", |ui| {
-        if fit.report.as_ref().is_some_and(|report| report.pairs.is_empty()) {
-            hint_ui(ui, "a fit from motion has no pairs of speed and torque to show");
-        }
-    });
+    section_ui(ui, "Fitted", |_| {});
+    let from_motion = fit.report.as_ref().is_some_and(|report| report.pairs.is_empty());
+    if from_motion {
+        hint_ui(ui, "A fit from motion has no pairs of speed and torque to show; its parameters are beside.");
+        return;
+    }
+    if fit.report.is_none() && kind == Some(LogKind::LinearAxis) {
+        hint_ui(ui, "A linear axis is fitted from its motion: start the fit, its parameters appear beside.");
+        return;
+    }
     let height = ui.available_height();
     let width = ui.available_width() - ui.spacing().item_spacing.x;
     ui.horizontal_top(|ui| {
-        curve_plot(context, fit, kind, ui, vec2(0.62 * width, height));
+        curve_plot(context, fit, ui, vec2(0.62 * width, height));
         convergence_plot(fit, ui, vec2(0.38 * width, height));
     });
 }
@@ -36,9 +41,8 @@ fn chart<'a>(ui: &Ui, size: egui::Vec2, x_label: &'a str, y_label: &'a str) -> P
         .on(plot, ui.visuals())
 }
 
-fn curve_plot(context: &ViewContext<'_>, fit: &FitRun, kind: Option<LogKind>, ui: &mut Ui, size: egui::Vec2) {
-    // The curve of a motor says nothing about a log of a linear axis.
-    let in_model = context.session.friction(fit.motor_index()).filter(|_| kind != Some(LogKind::LinearAxis));
+fn curve_plot(context: &ViewContext<'_>, fit: &FitRun, ui: &mut Ui, size: egui::Vec2) {
+    let in_model = context.session.friction(fit.motor_index());
     let colors = palette(ui.visuals());
     let pairs: Vec<[f64; 2]> = fit
         .report

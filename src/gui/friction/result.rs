@@ -35,23 +35,30 @@ pub(super) fn ui(context: &ViewContext<'_>, fit: &FitRun, ui: &mut Ui) {
     };
     parameters_ui(report, fit.held, ui);
     ui.add_space(4.0);
-    hint_ui(
-        ui,
-        format!(
-            "error {} {} ({} % of the signal), {} pairs, {} iterations, {}",
-            shown(report.rmse, 4),
-            report.rmse_unit,
-            shown(100.0 * report.relative_error, 3),
-            report.pairs.len(),
-            report.iterations,
-            stop_text(report.stop)
-        ),
-    );
+    hint_ui(ui, summary(report));
     for warning in &report.warnings {
         warning_ui(ui, warning);
     }
     findings_ui(report, ui);
     use_ui(context, fit, ui);
+}
+
+fn summary(report: &FitReport) -> String {
+    let error = format!(
+        "error {} {} ({} % of the signal)",
+        shown(report.rmse, 4),
+        report.rmse_unit,
+        shown(100.0 * report.relative_error, 3)
+    );
+    if report.pairs.is_empty() {
+        return error;
+    }
+    format!(
+        "{error}, {} pairs, {} iterations, {}",
+        report.pairs.len(),
+        report.iterations,
+        stop_text(report.stop)
+    )
 }
 
 /// What the fit says about the log, each once; the health of the log may say the same in a warning.
