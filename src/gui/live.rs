@@ -78,20 +78,7 @@ impl Live {
         let (commands, command_receiver) = sync_channel(COMMAND_CAPACITY);
         let (batch_sender, batches) = sync_channel(BATCH_CAPACITY);
         let lost = Arc::new(AtomicU64::new(0));
-        let thread = Worker {
-            batches: batch_sender,
-            lost: Arc::clone(&lost),
-            waker: Arc::clone(waker),
-            plant: None,
-            paused,
-            fell: false,
-            run: 0,
-            interval: Duration::from_millis(33),
-            clock: Clock::start(),
-            late_s: 0.0,
-            pending: Vec::new(),
-            problem: None,
-        };
+        let thread = Worker::new(batch_sender, Arc::clone(&lost), Arc::clone(waker), paused);
         std::thread::Builder::new()
             .name("live-robot".to_owned())
             .spawn(move || thread.work(&command_receiver))?;
@@ -201,6 +188,23 @@ struct Worker {
 }
 
 impl Worker {
+    fn new(batches: SyncSender<Batch>, lost: Arc<AtomicU64>, waker: Waker, paused: bool) -> Self {
+        Self {
+            batches,
+            lost,
+            waker,
+            plant: None,
+            paused,
+            fell: false,
+            run: 0,
+            interval: Duration::from_millis(33),
+            clock: Clock::start(),
+            late_s: 0.0,
+            pending: Vec::new(),
+            problem: None,
+        }
+    }
+
     /// Until the window drops its handle.
     fn work(mut self, commands: &Receiver<LiveCommand>) {
         let mut next_batch = Instant::now();
@@ -328,20 +332,7 @@ mod tests {
     use super::*;
 
     fn worker(batches: SyncSender<Batch>) -> Worker {
-        Worker {
-            batches,
-            lost: Arc::default(),
-            waker: Arc::new(|| {}),
-            plant: None,
-            paused: false,
-            fell: false,
-            run: 0,
-            interval: Duration::from_millis(33),
-            clock: Clock::start(),
-            late_s: 0.0,
-            pending: Vec::new(),
-            problem: None,
-        }
+        Worker::new(batches, Arc::default(), Arc::new(|| {}), false)
     }
 
     #[test]
