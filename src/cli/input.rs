@@ -45,7 +45,7 @@ pub(crate) fn load_model(path: &Path) -> Result<Model, Failure> {
 pub(crate) fn load_robot(path: &Path) -> Result<(String, RobotModel), Failure> {
     let model = load_model(path)?;
     match model.robot() {
-        Some(robot) => Ok((model.name.clone(), *robot)),
+        Some(robot) => Ok((model.name.clone(), robot.clone())),
         None => Err(Failure::Message(format!(
             "{}: this command needs a robot, but the file describes a single axis: give a model with a [robot] table",
             path.display()

@@ -271,7 +271,7 @@ impl App {
         &self,
     ) -> Option<(flqr_core::model_file::RobotModel, flqr_core::control::BalanceController)> {
         let gain = self.designer.in_force?.design.gain;
-        Some((*self.session.robot()?, self.session.balance_controller(gain)?))
+        Some((self.session.robot()?.clone(), self.session.balance_controller(gain)?))
     }
 
     fn write_state(&mut self, ctx: &Context) {

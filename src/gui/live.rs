@@ -337,7 +337,7 @@ mod tests {
 
     #[test]
     fn nothing_runs_and_no_old_sample_is_left_after_a_clear() {
-        let robot = *presets::paper().robot().unwrap();
+        let robot = presets::paper().robot().unwrap().clone();
         let gain = nalgebra::Matrix2x4::repeat(-1.0);
         let controller = BalanceController::new(ControllerKind::Lqr, &robot, gain).unwrap();
         let (sender, batches) = sync_channel(4);

@@ -88,7 +88,7 @@ impl Session {
     /// The controller that these settings and a gain make; none without a robot. FLQR without any friction
     /// is LQR, as [`Session::feedforward_problem`] says.
     pub(crate) fn balance_controller(&self, gain: Matrix2x4<f64>) -> Option<BalanceController> {
-        let robot = RobotModel { compensation: Some(self.compensation()), ..*self.robot()? };
+        let robot = RobotModel { compensation: Some(self.compensation()), ..self.robot()?.clone() };
         BalanceController::new(self.controller, &robot, gain)
             .or_else(|_| BalanceController::new(ControllerKind::Lqr, &robot, gain))
             .ok()

@@ -19,7 +19,7 @@ const TICKS: usize = 1000;
 
 fn paper() -> RobotModel {
     let text = include_str!("../../../presets/paper.toml");
-    *Model::from_toml(text, "paper.toml").expect("the preset loads").robot().expect("it is a robot")
+    Model::from_toml(text, "paper.toml").expect("the preset loads").robot().expect("it is a robot").clone()
 }
 
 /// 1000 ticks of the plant under state feedback, by substeps.

@@ -74,7 +74,7 @@ impl BalanceController {
             ControllerKind::Lqr => [None; 2],
             ControllerKind::Flqr => feedforward(robot)?,
         };
-        Ok(Self { gain, feedforward, torque_limit_nm: robot.torque_limit_nm.unwrap_or(f64::INFINITY) })
+        Ok(Self { gain, feedforward, torque_limit_nm: robot.limits.torque_nm.unwrap_or(f64::INFINITY) })
     }
 
     /// Torques of the left and the right motor, N m: −K X (Eq. 13) plus the feedforward at each motor's

@@ -2,7 +2,7 @@ use nalgebra::Matrix2x4;
 
 use super::*;
 use crate::model_file::{Model, RobotModel};
-use crate::robot::State;
+use crate::robot::{MotorLimits, State};
 
 const MODEL: &str = r#"
 name = "bench robot"
@@ -23,7 +23,7 @@ offset_nm = 0.002
 "#;
 
 fn robot() -> RobotModel {
-    *Model::from_toml(MODEL, "test").unwrap().robot().unwrap()
+    Model::from_toml(MODEL, "test").unwrap().robot().unwrap().clone()
 }
 
 fn gain() -> Matrix2x4<f64> {
@@ -52,7 +52,8 @@ fn flqr_adds_the_friction_of_motors_that_have_one() {
 
 #[test]
 fn torque_stays_within_the_limit_of_the_model() {
-    let limited = RobotModel { torque_limit_nm: Some(0.05), ..robot() };
+    let limited =
+        RobotModel { limits: MotorLimits { torque_nm: Some(0.05), ..MotorLimits::default() }, ..robot() };
     let controller = BalanceController::new(ControllerKind::Lqr, &limited, gain()).unwrap();
     assert_eq!(controller.step(&measurement())[1], 0.05);
     let mut fallen = measurement();

@@ -4,13 +4,20 @@
 //! names the file, the line, the key and the mend; an unknown key is an error, because a misspelt key that
 //! is silently dropped would leave a default in its place.
 
+mod axis_schema;
 pub mod presets;
-mod schema;
+mod refusal;
+mod robot_schema;
 
+use crate::ParameterError;
 use crate::friction::{Compensation, Stribeck};
 use crate::lqr::Weights;
-use crate::robot::RobotParameters;
-use schema::{AxisFile, Refusal, RobotFile};
+use crate::robot::{
+    Actuation, Chassis, Legs, MotorLimits, RobotParameters, SensorSettings, Surroundings, YawHold,
+};
+use axis_schema::AxisFile;
+use refusal::Refusal;
+use robot_schema::RobotFile;
 
 /// A loaded model.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,19 +37,87 @@ pub enum Rig {
     Axis(AxisModel),
 }
 
-/// A robot with the friction of its motors and the settings of its controller.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// A robot with its motors, sensors and surroundings, and the settings of its controller. Tables that a
+/// file does not have are at their defaults.
+#[derive(Clone, Debug, PartialEq)]
 pub struct RobotModel {
-    /// Masses, lengths and inertias.
+    /// Masses, lengths and inertias, at the legs' present height.
     pub parameters: RobotParameters,
+    /// How they follow the legs' height, if the file says so.
+    pub legs: Option<Legs>,
+    /// Both wheels apart, and the turning body.
+    pub chassis: Chassis,
     /// Friction of the left and the right motor; none where the file has no table.
     pub friction: [Option<Stribeck>; 2],
     /// Weights of the cost, if the file has them.
     pub weights: Option<Weights>,
     /// Friction feedforward, if the file has it.
     pub compensation: Option<Compensation>,
-    /// Largest torque of one motor, N m; unlimited where the file gives none.
-    pub torque_limit_nm: Option<f64>,
+    /// What keeps the heading, if the file says so.
+    pub yaw_hold: Option<YawHold>,
+    /// What the motors can do.
+    pub limits: MotorLimits,
+    /// From asked torque to shaft.
+    pub actuation: Actuation,
+    /// Sensors.
+    pub sensors: SensorSettings,
+    /// What acts from outside.
+    pub surroundings: Surroundings,
+}
+
+impl RobotModel {
+    /// A robot on level ground of which nothing but masses, lengths and inertias is known.
+    pub fn new(parameters: RobotParameters) -> Self {
+        Self {
+            parameters,
+            legs: None,
+            chassis: Chassis::default(),
+            friction: [None; 2],
+            weights: None,
+            compensation: None,
+            yaw_hold: None,
+            limits: MotorLimits::default(),
+            actuation: Actuation::default(),
+            sensors: SensorSettings::default(),
+            surroundings: Surroundings::default(),
+        }
+    }
+
+    /// Replaces the parameters. Tables over the legs' height are scaled so that they go through the new
+    /// values at the present height.
+    pub fn set_parameters(&mut self, parameters: RobotParameters) {
+        if let Some(legs) = &mut self.legs {
+            legs.com_height_m.scale(parameters.com_height_m / self.parameters.com_height_m);
+            if let Some(inertia) = &mut legs.body_inertia_kg_m2 {
+                inertia.scale(parameters.body_inertia_kg_m2 / self.parameters.body_inertia_kg_m2);
+            }
+        }
+        self.parameters = parameters;
+    }
+
+    /// The robot with its legs at another height.
+    ///
+    /// # Errors
+    /// A robot without a table over the legs' height, or a height outside of it.
+    pub fn at_leg_height(&self, leg_height_m: f64) -> Result<Self, ParameterError> {
+        let Some(legs) = &self.legs else {
+            let allowed = "left out, because com_height_m of this model is one number and not a table over leg_height_m";
+            return Err(ParameterError { name: "leg_height_m", value: leg_height_m, allowed });
+        };
+        let parameters = legs.at(leg_height_m, &self.parameters)?;
+        Ok(Self { parameters, legs: Some(Legs { leg_height_m, ..legs.clone() }), ..self.clone() })
+    }
+
+    /// Refuses what no robot can have.
+    pub fn validate(&self) -> Result<(), ParameterError> {
+        self.parameters.validate()?;
+        self.chassis.validate()?;
+        self.yaw_hold.map_or(Ok(()), |hold| hold.validate())?;
+        self.limits.validate()?;
+        self.actuation.validate()?;
+        self.sensors.validate()?;
+        self.surroundings.validate()
+    }
 }
 
 /// A single axis on a bench.
@@ -214,6 +289,73 @@ offset_n = -3.2
         for text in [ROBOT, RAIL, &full] {
             let model = Model::from_toml(text, "m.toml").unwrap();
             assert_eq!(Model::from_toml(&model.to_toml(), "again").unwrap(), model, "{}", model.to_toml());
+        }
+    }
+
+    /// Every table that is not needed, and legs.
+    const WHOLE: &str = r#"name = "whole"
+[robot]
+body_mass_kg = 13.0
+wheel_mass_kg = 1.0
+wheel_inertia_kg_m2 = 0.005
+wheel_radius_m = 0.1
+leg_height_m = 0.37
+com_height_m = { leg_height_m = [0.32, 0.42], com_height_m = [0.10, 0.14] }
+body_inertia_kg_m2 = { leg_height_m = [0.32, 0.37, 0.42], body_inertia_kg_m2 = [0.08, 0.1, 0.13] }
+[chassis]
+track_width_m = 0.36
+[yaw_hold]
+stiffness_nm_rad = 1.5
+damping_nm_s_rad = 0.3
+[limits]
+torque_nm = 2.42
+rated_speed_rad_s = 51.3
+no_load_speed_rad_s = 60.0
+[actuation]
+delay_s = 0.006
+[sensors]
+imu_rate_hz = 200.0
+[surroundings]
+slope_rad = 0.05
+tether = { stiffness_n_m = 12.0, anchor_m = -0.05 }
+payload = { mass_kg = 1.0, height_m = 0.2 }
+"#;
+
+    #[test]
+    fn legs_and_every_further_table_survive_the_round_trip() {
+        let model = Model::from_toml(WHOLE, "m.toml").unwrap();
+        assert_eq!(Model::from_toml(&model.to_toml(), "again").unwrap(), model, "{}", model.to_toml());
+        let robot = model.robot().unwrap();
+        assert!((robot.parameters.com_height_m - 0.12).abs() < 1e-15);
+        assert_eq!(robot.parameters.body_inertia_kg_m2, 0.1);
+        let raised = robot.at_leg_height(0.42).unwrap();
+        assert_eq!((raised.parameters.com_height_m, raised.parameters.body_inertia_kg_m2), (0.14, 0.13));
+        assert_eq!(robot.at_leg_height(0.5).unwrap_err().name, "leg_height_m");
+        let mut corrected = robot.clone();
+        corrected.set_parameters(RobotParameters { com_height_m: 0.06, ..robot.parameters });
+        assert!((corrected.at_leg_height(0.42).unwrap().parameters.com_height_m - 0.07).abs() < 1e-15);
+        assert_eq!(robot.sensors.imu_period_ticks(), 5);
+        assert_eq!(robot.surroundings.tether.unwrap().stiffness_n_m, 12.0);
+    }
+
+    #[test]
+    fn each_mistake_in_a_further_table_is_named_with_its_line() {
+        for (old, new, line, part) in [
+            ("leg_height_m = 0.37\n", "", 7, "needs the present leg_height_m"),
+            ("leg_height_m = 0.37", "leg_height_m = 0.5", 7, "leg_height_m = 0.5 is out of range"),
+            ("com_height_m = [0.10, 0.14]", "com_height_m = [0.10]", 8, "has 2 values and com_height_m 1"),
+            ("[0.32, 0.42]", "[0.42, 0.32]", 8, "0.32 follows 0.42"),
+            ("com_height_m = [0.10, 0.14] }", "com_hight_m = [0.10, 0.14] }", 8, "a table with the lists"),
+            ("imu_rate_hz = 200.0", "imu_rate_hz = 300.0", 22, "divides 1000"),
+            ("no_load_speed_rad_s = 60.0", "no_load_speed_rad_s = 50.0", 18, "above rated_speed_rad_s"),
+            ("slope_rad = 0.05", "slope_rad = 2.0", 24, "slope_rad = 2 is out of range"),
+            ("delay_s = 0.006", "delay = 0.006", 20, "unknown field `delay`"),
+        ] {
+            let error = Model::from_toml(&WHOLE.replacen(old, new, 1), "m.toml").unwrap_err();
+            assert!(
+                error.line == line && error.problem.contains(part),
+                "{error} (expected line {line}, {part})"
+            );
         }
     }
 

@@ -37,6 +37,18 @@
 //! | c₁…c₅ [8] | [`Coefficients`] | see there |
 //! | c₁, c₂ [Table 2] | `learn_cognitive`, `learn_social` | 1 |
 
+mod actuation;
+mod chassis;
+mod legs;
+mod sensors;
+mod surroundings;
+
+pub use actuation::{Actuation, LONGEST_DELAY_S, MotorLimits};
+pub use chassis::{Chassis, YawHold};
+pub use legs::{HeightNode, HeightTableError, Legs, OverHeight};
+pub use sensors::SensorSettings;
+pub use surroundings::{Payload, Surroundings, Tether};
+
 use nalgebra::{Matrix4, Matrix4x2, Vector4};
 use serde::{Deserialize, Serialize};
 
@@ -45,13 +57,8 @@ use crate::parameter::{ParameterError, positive};
 /// Acceleration of free fall in model files that give none, m/s².
 pub const STANDARD_GRAVITY_M_S2: f64 = 9.81;
 
-fn standard_gravity() -> f64 {
-    STANDARD_GRAVITY_M_S2
-}
-
-/// Physical parameters of the robot, keys as in the model file's `[robot]` table.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+/// Physical parameters of the robot, names as in the model file's `[robot]` table.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RobotParameters {
     /// M: everything above the axle, kg.
     pub body_mass_kg: f64,
@@ -66,7 +73,6 @@ pub struct RobotParameters {
     /// J: body about its centre of mass, kg m².
     pub body_inertia_kg_m2: f64,
     /// g: acceleration of free fall, m/s².
-    #[serde(default = "standard_gravity")]
     pub gravity_m_s2: f64,
 }
 

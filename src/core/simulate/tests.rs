@@ -11,7 +11,7 @@ use crate::model_file::{Model, RobotModel, presets};
 use crate::robot::State;
 
 fn paper() -> RobotModel {
-    *presets::paper().robot().unwrap()
+    presets::paper().robot().unwrap().clone()
 }
 
 fn gain(robot: &RobotModel) -> Matrix2x4<f64> {
@@ -73,7 +73,7 @@ fn lqr_of_the_papers_preset_hunts_over_the_papers_displacement() {
 #[test]
 fn every_preset_survives_a_kick_and_settles_under_flqr() {
     for (name, text) in presets::ALL {
-        let robot = *Model::from_toml(text, name).unwrap().robot().unwrap();
+        let robot = Model::from_toml(text, name).unwrap().robot().unwrap().clone();
         let controller = BalanceController::new(ControllerKind::Flqr, &robot, gain(&robot)).unwrap();
         let go_on = &mut |_: &Sample| ControlFlow::Continue(());
         let kick = Scenario::Kick(Push::KICK);

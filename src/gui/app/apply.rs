@@ -52,7 +52,7 @@ impl App {
             Command::ResetWeights => self.reset_weights(),
             Command::SetParameters(parameters) => {
                 if let Some(robot) = self.session.robot_mut() {
-                    robot.parameters = parameters;
+                    robot.set_parameters(parameters);
                 }
                 self.designer.update(&self.session);
                 self.send_robot();
@@ -65,7 +65,7 @@ impl App {
             }
             Command::SetTorqueLimit(limit) => {
                 if let Some(robot) = self.session.robot_mut() {
-                    robot.torque_limit_nm = limit;
+                    robot.limits.torque_nm = limit;
                 }
                 self.send_robot();
             }

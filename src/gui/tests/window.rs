@@ -213,8 +213,8 @@ fn friction_and_limit_begin_with_those_of_the_papers_preset() {
     let saved = Model::from_toml(&std::fs::read_to_string(&file.0).unwrap(), "saved").unwrap();
     let (saved, paper) = (saved.robot().unwrap(), presets::paper());
     let paper = paper.robot().unwrap();
-    assert_eq!(saved.torque_limit_nm, paper.torque_limit_nm);
-    assert!(saved.torque_limit_nm.is_some());
+    assert_eq!(saved.limits.torque_nm, paper.limits.torque_nm);
+    assert!(saved.limits.torque_nm.is_some());
     assert_eq!(saved.friction[1], paper.friction[0]);
 }
 
@@ -546,7 +546,11 @@ fn settings_that_the_file_lacks_are_the_presets_said_and_not_saved() {
     let saved = |window: &mut Window| {
         click(window, "Save");
         until(window, "saving", |s| s["message"].as_str().is_some_and(|m| m.starts_with("Saved")));
-        *Model::from_toml(&std::fs::read_to_string(&file.0).unwrap(), "saved").unwrap().robot().unwrap()
+        Model::from_toml(&std::fs::read_to_string(&file.0).unwrap(), "saved")
+            .unwrap()
+            .robot()
+            .unwrap()
+            .clone()
     };
     let unedited = saved(&mut window);
     assert_eq!((unedited.weights, unedited.compensation), (None, None));

@@ -23,7 +23,7 @@ static FIRST_VALUES: LazyLock<FirstValues> = LazyLock::new(|| {
     let paper = presets::paper();
     let values = paper.robot().and_then(|robot| {
         let [left, _] = robot.friction;
-        Some(FirstValues { curve: *left?.parameters(), torque_limit_nm: robot.torque_limit_nm? })
+        Some(FirstValues { curve: *left?.parameters(), torque_limit_nm: robot.limits.torque_nm? })
     });
     values.expect("the paper's preset has friction and a torque limit, as a test of this page finds")
 });
@@ -69,7 +69,7 @@ impl ParameterEditor {
         Self {
             robot: session.robot().map(|robot| robot.parameters),
             friction: [curve(0), curve(1)],
-            torque_limit_nm: session.robot().and_then(|robot| robot.torque_limit_nm),
+            torque_limit_nm: session.robot().and_then(|robot| robot.limits.torque_nm),
         }
     }
 

@@ -72,7 +72,7 @@ impl Response {
             return;
         }
         self.of = key;
-        let robot = flqr_core::model_file::RobotModel { parameters: designed.parameters, ..*robot };
+        let robot = flqr_core::model_file::RobotModel { parameters: designed.parameters, ..robot.clone() };
         let initial = State { x_m: START_M, ..State::default() };
         let step = seconds / POINTS as f64;
         let response = predicted_response(&robot, &designed.design.gain, initial, seconds, step);

@@ -1,0 +1,70 @@
+//! What acts on the robot from outside and is not part of it.
+
+use serde::{Deserialize, Serialize};
+
+use crate::parameter::{ParameterError, finite, not_negative, within};
+
+/// Keys of the model file's `[surroundings]` table: level ground and nothing else where it is missing. The
+/// controller's design knows nothing of them.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Surroundings {
+    /// Slope of the ground, upward in the direction of x, rad.
+    pub slope_rad: f64,
+    /// A cable that pulls the robot back.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tether: Option<Tether>,
+    /// A load on the body.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub payload: Option<Payload>,
+}
+
+/// A spring between the robot and a fixed point; it pulls and never pushes.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Tether {
+    /// Stiffness, N/m.
+    pub stiffness_n_m: f64,
+    /// Where it is anchored along x, m.
+    #[serde(default)]
+    pub anchor_m: f64,
+    /// Distance from the anchor within which it is slack, m.
+    #[serde(default)]
+    pub slack_m: f64,
+    /// Where it holds the body: above the axle along the body, m.
+    #[serde(default)]
+    pub height_m: f64,
+}
+
+/// A point mass that is fixed to the body.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Payload {
+    /// Mass, kg.
+    pub mass_kg: f64,
+    /// Above the axle along the body, m.
+    pub height_m: f64,
+    /// In front of the line from axle to centre of mass, m.
+    #[serde(default)]
+    pub forward_m: f64,
+}
+
+impl Surroundings {
+    /// Refuses slopes of more than 0.5 rad, masses and stiffnesses below zero, and lengths that are not
+    /// finite.
+    pub fn validate(&self) -> Result<(), ParameterError> {
+        within("slope_rad", self.slope_rad, -0.5..=0.5, "from -0.5 to 0.5")?;
+        if let Some(tether) = &self.tether {
+            not_negative("stiffness_n_m", tether.stiffness_n_m)?;
+            finite("anchor_m", tether.anchor_m)?;
+            not_negative("slack_m", tether.slack_m)?;
+            finite("height_m", tether.height_m)?;
+        }
+        if let Some(payload) = &self.payload {
+            not_negative("mass_kg", payload.mass_kg)?;
+            finite("height_m", payload.height_m)?;
+            finite("forward_m", payload.forward_m)?;
+        }
+        Ok(())
+    }
+}
