@@ -8,7 +8,7 @@ use flqr_core::control::{BalanceController, ControllerKind};
 use flqr_core::lqr;
 use flqr_core::model_file::{Model, RobotModel};
 use flqr_core::robot::State;
-use flqr_core::simulate::{Forcing, Plant, Simulation, SimulationSettings};
+use flqr_core::simulate::{Forcing, PlanarPlant, Simulation, SimulationSettings};
 
 fn main() {
     divan::main();
@@ -27,7 +27,7 @@ fn paper() -> RobotModel {
 fn plant(bencher: Bencher, substeps: u32) {
     let robot = paper();
     let gain = gain(&robot);
-    let start = Plant::new(&robot.parameters, robot.friction, &pitched());
+    let start = PlanarPlant::new(&robot.parameters, robot.friction, &pitched());
     bencher.counter(divan::counter::ItemsCount::new(TICKS)).with_inputs(|| start.clone()).bench_values(
         |mut plant| {
             for _ in 0..TICKS {

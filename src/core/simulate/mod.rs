@@ -4,18 +4,16 @@
 //! processors: sticking, rounding sensors and an unstable body would make another path of it within
 //! seconds, and a run is to be the same everywhere.
 
-mod near_angle;
 mod noise;
-mod plant;
+mod planar;
 mod response;
 mod sample;
 mod scenario;
 mod sensors;
 mod simulation;
-mod sliding;
 mod statistics;
 
-pub use plant::{Forcing, Plant};
+pub use planar::{Forcing, PlanarPlant};
 pub use response::predicted_response;
 pub use sample::Sample;
 pub use scenario::{Push, Run, Scenario, UnknownScenario};

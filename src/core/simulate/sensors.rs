@@ -1,7 +1,7 @@
 //! What the robot knows of itself: encoders and motor speeds every tick, the IMU every tenth.
 
 use super::noise::Noise;
-use super::plant::Plant;
+use super::planar::PlanarPlant;
 use crate::ParameterError;
 use crate::control::Measurement;
 use crate::parameter::not_negative;
@@ -98,7 +98,7 @@ impl Sensors {
 
     /// Readings at a tick. x and ẋ come from the wheels' mean: x = r (q + θ), ẋ = r (q̇ + θ̇) with the
     /// IMU's held values, as the robot computes them.
-    pub(super) fn read(&mut self, plant: &Plant, tick: u64) -> Readings {
+    pub(super) fn read(&mut self, plant: &PlanarPlant, tick: u64) -> Readings {
         if tick.is_multiple_of(u64::from(self.settings.imu_period_ticks)) {
             self.sample_imu(&plant.state());
         }

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use super::noise::Noise;
-use super::plant::{Forcing, Plant};
+use super::planar::{Forcing, PlanarPlant};
 use super::sample::Sample;
 use super::sensors::{SensorSettings, Sensors};
 use crate::ParameterError;
@@ -75,7 +75,7 @@ pub struct Simulation {
     controller: BalanceController,
     settings: SimulationSettings,
     push_height_m: f64,
-    plant: Plant,
+    plant: PlanarPlant,
     sensors: Sensors,
     torque_noise: [Noise; 2],
     under_way: VecDeque<[f64; 2]>,
@@ -102,7 +102,7 @@ impl Simulation {
             controller,
             settings,
             push_height_m: robot.parameters.com_height_m,
-            plant: Plant::new(&robot.parameters, robot.friction, &settings.initial),
+            plant: PlanarPlant::new(&robot.parameters, robot.friction, &settings.initial),
             sensors: Sensors::new(settings.sensors, radius, settings.seed, SENSOR_STREAM),
             torque_noise: [0, 1].map(|motor| Noise::new(settings.seed, TORQUE_STREAM + motor)),
             under_way: std::iter::repeat_n([0.0; 2], settings.delay_ticks as usize).collect(),

@@ -5,21 +5,21 @@ const REACH_RAD: f64 = 0.02;
 
 /// An angle with its sine and cosine.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct NearAngle {
+pub(in crate::simulate) struct NearAngle {
     angle: f64,
     sin: f64,
     cos: f64,
 }
 
 impl NearAngle {
-    pub(super) fn new(angle: f64) -> Self {
+    pub(in crate::simulate) fn new(angle: f64) -> Self {
         let (sin, cos) = libm::sincos(angle);
         Self { angle, sin, cos }
     }
 
     /// Sine and cosine of an angle: the rotation from the known angle by a series where that is near.
     #[inline(always)]
-    pub(super) fn sin_cos(&self, angle: f64) -> (f64, f64) {
+    pub(in crate::simulate) fn sin_cos(&self, angle: f64) -> (f64, f64) {
         let turn = angle - self.angle;
         if turn.abs() > REACH_RAD || turn.is_nan() {
             return libm::sincos(angle);

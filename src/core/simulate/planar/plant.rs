@@ -34,7 +34,7 @@ pub struct Forcing {
 
 /// A robot in motion.
 #[derive(Clone, Debug)]
-pub struct Plant {
+pub struct PlanarPlant {
     laws: Laws,
     motion: Motion,
     phase: Phase,
@@ -78,7 +78,7 @@ struct Loads {
     start: NearAngle,
 }
 
-impl Plant {
+impl PlanarPlant {
     /// A robot at `state`. The parameters are taken as validated.
     pub fn new(parameters: &RobotParameters, friction: [Option<Stribeck>; 2], state: &State) -> Self {
         let laws = Laws::new(parameters, &friction);

@@ -44,7 +44,7 @@ fn pitched(pitch_rad: f64) -> State {
 #[test]
 fn without_friction_and_torque_energy_is_kept() {
     // Far enough to swing through below the axle: every term of Eqs. 4 and 5 takes part.
-    let mut plant = Plant::new(&ROBOT, [None; 2], &pitched(0.3));
+    let mut plant = PlanarPlant::new(&ROBOT, [None; 2], &pitched(0.3));
     let energy = ROBOT.energy_j(&plant.state());
     let mut fastest: f64 = 0.0;
     for _ in 0..10_000 {
@@ -58,7 +58,7 @@ fn without_friction_and_torque_energy_is_kept() {
 
 #[test]
 fn push_does_the_work_of_its_force_along_its_path() {
-    let mut plant = Plant::new(&ROBOT, [None; 2], &pitched(0.1));
+    let mut plant = PlanarPlant::new(&ROBOT, [None; 2], &pitched(0.1));
     let forcing = Forcing { push_n: 7.0, push_height_m: 0.2, ..Forcing::default() };
     let power =
         |state: &State| 7.0 * (state.x_dot_m_s + 0.2 * state.pitch_rad.cos() * state.pitch_rate_rad_s);
@@ -77,7 +77,7 @@ fn push_does_the_work_of_its_force_along_its_path() {
 fn small_angles_follow_the_exact_solution_of_the_linear_model() {
     let model = ROBOT.linear_model();
     let (start, torque_nm, seconds) = (pitched(1e-5), 2e-5, 0.3);
-    let mut plant = Plant::new(&ROBOT, [None; 2], &start);
+    let mut plant = PlanarPlant::new(&ROBOT, [None; 2], &start);
     for _ in 0..300 {
         plant.advance(&torque(torque_nm), 1e-3, 10);
     }
@@ -98,7 +98,7 @@ fn rest_is_kept_to_the_last_bit_inside_the_range_and_left_just_outside() {
     let [low, high] = [-0.1378 - 0.0002, 0.1378 - 0.0002];
     let state = State { x_m: 0.123, ..State::default() };
     for inside in [low * (1.0 - 1e-9), 0.7 * low, 0.0, 0.9 * high, high * (1.0 - 1e-9)] {
-        let mut plant = Plant::new(&ROBOT, table_4(), &state);
+        let mut plant = PlanarPlant::new(&ROBOT, table_4(), &state);
         let angle = plant.motor_angle_rad();
         for _ in 0..10_000 {
             plant.advance(&torque(inside), 1e-3, 10);
@@ -108,7 +108,7 @@ fn rest_is_kept_to_the_last_bit_inside_the_range_and_left_just_outside() {
         assert_eq!(plant.state().pitch_rad, 0.0, "{inside} N m");
     }
     for outside in [low * (1.0 + 1e-9), high * (1.0 + 1e-9), 2.0 * high] {
-        let mut plant = Plant::new(&ROBOT, table_4(), &state);
+        let mut plant = PlanarPlant::new(&ROBOT, table_4(), &state);
         plant.advance(&torque(outside), 1e-3, 10);
         assert!(!plant.stuck(), "{outside} N m");
         assert_eq!(plant.motor_speed_rad_s().signum(), outside.signum());
@@ -117,7 +117,7 @@ fn rest_is_kept_to_the_last_bit_inside_the_range_and_left_just_outside() {
 
 #[test]
 fn torque_ramp_breaks_away_at_the_first_step_beyond_the_range() {
-    let mut plant = Plant::new(&ROBOT, table_4(), &State::default());
+    let mut plant = PlanarPlant::new(&ROBOT, table_4(), &State::default());
     let moved = (0..).find(|&tick| {
         plant.advance(&torque(f64::from(tick) * 1e-4), 1e-3, 10);
         plant.motor_speed_rad_s() != 0.0
@@ -137,7 +137,7 @@ fn stuck_robot_tips_rigidly_and_breaks_away_when_theory_says() {
     let holding_per_rad = (c1 * ROBOT.wheel_radius_m + c2) * c4 / locked_inertia;
     let break_pitch = (0.1378 + 0.0002) / holding_per_rad;
     let break_s = (break_pitch / start).acosh() / rate;
-    let mut plant = Plant::new(&ROBOT, table_4(), &pitched(start));
+    let mut plant = PlanarPlant::new(&ROBOT, table_4(), &pitched(start));
     let angle = plant.motor_angle_rad();
     let last_stuck = (break_s / 1e-3).floor() as usize;
     for tick in 1..=last_stuck {
@@ -170,7 +170,7 @@ fn driven(mut step: impl FnMut(f64) -> State) -> Vec<State> {
 }
 
 fn driven_plant(substeps: u32) -> (Vec<State>, usize) {
-    let mut plant = Plant::new(&ROBOT, table_4(), &pitched(0.02));
+    let mut plant = PlanarPlant::new(&ROBOT, table_4(), &pitched(0.02));
     let mut stops = 0;
     let states = driven(|torque_nm| {
         let before = plant.stuck();

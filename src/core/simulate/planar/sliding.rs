@@ -13,7 +13,7 @@ const WITHIN_BITS: u32 = f64::MANTISSA_DIGITS - 1 - CELL_BITS;
 
 /// Sum of the friction of motors that turn at one speed.
 #[derive(Clone, Debug)]
-pub(super) struct SlidingFriction {
+pub(in crate::simulate) struct SlidingFriction {
     curves: Vec<Stribeck>,
     viscous_nm_s_rad: f64,
     offset_nm: f64,
@@ -24,7 +24,7 @@ pub(super) struct SlidingFriction {
 }
 
 impl SlidingFriction {
-    pub(super) fn new(curves: impl IntoIterator<Item = Stribeck>) -> Self {
+    pub(in crate::simulate) fn new(curves: impl IntoIterator<Item = Stribeck>) -> Self {
         let curves: Vec<Stribeck> = curves.into_iter().collect();
         let lowest_bits = 2.0_f64.powi(LOWEST_EXPONENT).to_bits();
         let count = if curves.is_empty() { 0 } else { (OCTAVES as u64) << CELL_BITS };
@@ -41,7 +41,7 @@ impl SlidingFriction {
     /// Friction at a speed, N m, for shafts that slide in `direction` (1 or −1), also where the speed is
     /// still or already 0.
     #[inline(always)]
-    pub(super) fn torque_nm(&self, speed_rad_s: f64, direction: f64) -> f64 {
+    pub(in crate::simulate) fn torque_nm(&self, speed_rad_s: f64, direction: f64) -> f64 {
         let level = self.level_nm(speed_rad_s.abs());
         direction * level + (self.viscous_nm_s_rad * speed_rad_s + self.offset_nm)
     }

@@ -1,0 +1,7 @@
+//! The robot in one plane: both wheels turn together, the ground is level.
+
+pub(super) mod near_angle;
+mod plant;
+pub(super) mod sliding;
+
+pub use plant::{Forcing, PlanarPlant};
