@@ -4,8 +4,10 @@
 //! processors: sticking, rounding sensors and an unstable body would make another path of it within
 //! seconds, and a run is to be the same everywhere.
 
+mod change;
 mod noise;
 mod planar;
+mod plant;
 mod response;
 mod sample;
 mod scenario;
@@ -14,6 +16,7 @@ mod simulation;
 mod statistics;
 
 pub use planar::{Forcing, PlanarPlant};
+pub use plant::{Plant, Pose};
 pub use response::predicted_response;
 pub use sample::Sample;
 pub use scenario::{Push, Run, Scenario, UnknownScenario};

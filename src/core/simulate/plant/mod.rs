@@ -1,0 +1,236 @@
+//! The whole robot: two wheels apart, pitch and yaw, motors whose friction truly sticks.
+//!
+//! # Dynamics
+//! The wheels roll without slip, neither along nor across: the axle's middle moves at v along the heading,
+//! the body leans by θ and turns at ψ̇. With the notation of [`crate::robot`], b the track, J_ψ the body
+//! about the vertical and A = M + 2m + 2I/r², D = J + M l² (Kane's equations; the accelerations of the
+//! centre of mass are those of a point at l from a frame that turns at ψ̇):
+//! - A v̇ + M l cos θ θ̈ = M l sin θ (θ̇² + ψ̇²) + ΣT/r + F
+//! - M l cos θ v̇ + D θ̈ = M g l sin θ + M l² sin θ cos θ ψ̇² − ΣT + h cos θ F
+//! - (J_ψ + M l² sin² θ + 2 (m + I/r²) (b/2)² + I) ψ̈ = −M l sin θ (v + 2 l cos θ θ̇) ψ̇ + (b/2r)(T_r − T_l)
+//!
+//! Without yaw the first two are Eqs. 5 and 4. T is the torque after friction.
+//!
+//! # Method
+//! The coordinates are both motor angles and the pitch, because friction acts along the motor angles: a
+//! stuck shaft is q̇ = 0 exactly and q does not change by a single bit. The wheels' paths, the speed and
+//! the yaw follow: s = r (q + θ), v = (ṡ_l + ṡ_r)/2, ψ = (s_r − s_l)/b. Friction is set-valued
+//! (Filippov): at q̇ = 0 it takes whatever value in [f_p − f_s, f_p + f_s] keeps q̈ = 0. Between changes of
+//! phase, of which each shaft has its own, the motion is smooth and a Runge-Kutta step of order 4 serves;
+//! the instant of a change is located inside the step, and the phases that follow are the one combination
+//! that is consistent with both ranges.
+//!
+//! # Neglected
+//! Slip of the tyres, their springiness and the turning torque of their contact patches; motion of the
+//! legs; the difference between the body's inertias about its own long and fore-and-aft axes.
+
+mod laws;
+mod motion;
+mod shafts;
+
+use super::change::first_below_zero;
+use super::planar::Forcing;
+use crate::friction::Stribeck;
+use crate::robot::{RobotParameters, State};
+use laws::{Laws, Loads};
+use motion::{Motion, runge_kutta};
+use shafts::{Phase, Phases, Shaft, margins, settled, shaft_torques};
+
+/// Changes of phase within one substep after which resting shafts are taken as stuck for the rest of it.
+const MAX_CHANGES: usize = 8;
+
+/// The robot in motion.
+#[derive(Clone, Debug)]
+pub struct Plant {
+    laws: Laws,
+    shafts: [Shaft; 2],
+    motion: Motion,
+    phases: Phases,
+}
+
+/// Where the robot is, and how it stands and moves: the truth behind the sensors.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Pose {
+    /// State along the path; x is the way of the axle's middle.
+    pub state: State,
+    /// Heading, 0 at the start, to the left positive, rad.
+    pub yaw_rad: f64,
+    /// Yaw rate, rad/s.
+    pub yaw_rate_rad_s: f64,
+    /// Roll, right wheel higher positive, rad.
+    pub roll_rad: f64,
+    /// Height of the ground under the left and the right wheel, m.
+    pub ground_height_m: [f64; 2],
+}
+
+impl Plant {
+    /// A robot at `start` with heading 0 and no yaw rate. The parameters are taken as validated.
+    pub fn new(
+        parameters: &RobotParameters,
+        friction: [Option<Stribeck>; 2],
+        (track_width_m, yaw_inertia_kg_m2): (f64, f64),
+        start: &State,
+    ) -> Self {
+        let laws = Laws::new(parameters, track_width_m, yaw_inertia_kg_m2);
+        let shafts = friction.map(Shaft::new);
+        let motion = Motion {
+            angle: [start.x_m / parameters.wheel_radius_m - start.pitch_rad; 2],
+            speed: [parameters.motor_speed_rad_s(start); 2],
+            lean: start.pitch_rad,
+            lean_rate: start.pitch_rate_rad_s,
+            uphill: start.x_m,
+        };
+        let phases = [0, 1].map(|i: usize| shafts[i].phase_at(motion.speed[i]));
+        Self { laws, shafts, motion, phases }
+    }
+
+    /// Moves on by `dt_s` in `substeps` equal steps of order 4. A torque or state that is not finite makes
+    /// the motion not finite and nothing else.
+    pub fn advance(&mut self, forcing: &Forcing, dt_s: f64, substeps: u32) {
+        let loads = self.laws.loads(forcing, &self.motion);
+        let step = dt_s / f64::from(substeps);
+        // Held shafts have been checked at the end of each substep, but under the loads of that call.
+        self.release(&loads);
+        for _ in 0..substeps {
+            self.substep(&loads, step);
+        }
+    }
+
+    /// The true state.
+    pub fn state(&self) -> State {
+        let Motion { angle, speed, lean, lean_rate, .. } = self.motion;
+        State {
+            x_m: self.laws.radius_m * (0.5 * (angle[0] + angle[1]) + lean),
+            x_dot_m_s: self.laws.radius_m * (0.5 * (speed[0] + speed[1]) + lean_rate),
+            pitch_rad: lean,
+            pitch_rate_rad_s: lean_rate,
+        }
+    }
+
+    /// The true state with heading and roll.
+    pub fn pose(&self) -> Pose {
+        let [left, right] = self.motion.angle;
+        let (_, yaw_rate_rad_s) = self.laws.forward_and_yaw(&self.motion);
+        Pose {
+            state: self.state(),
+            yaw_rad: self.laws.radius_m * (right - left) / self.laws.track_m,
+            yaw_rate_rad_s,
+            ..Pose::default()
+        }
+    }
+
+    /// Motor angles q, left and right, rad: 0 with the robot upright at x = 0.
+    pub fn motor_angle_rad(&self) -> [f64; 2] {
+        self.motion.angle
+    }
+
+    /// Motor speeds q̇, rad/s; exactly 0 while stuck.
+    pub fn motor_speed_rad_s(&self) -> [f64; 2] {
+        self.motion.speed
+    }
+
+    /// Whether friction holds the shafts.
+    pub fn stuck(&self) -> [bool; 2] {
+        self.phases.map(|phase| phase == Phase::Stuck)
+    }
+
+    /// Kinetic and potential energy, J; 0 when upright at rest.
+    pub fn energy_j(&self) -> f64 {
+        self.laws.energy_j(&self.motion)
+    }
+
+    /// Whether every coordinate and speed is a finite number.
+    pub fn is_finite(&self) -> bool {
+        self.motion.is_finite()
+    }
+
+    fn substep(&mut self, loads: &Loads, step: f64) {
+        let mut left = step;
+        for _ in 0..MAX_CHANGES {
+            let next = self.step(loads, left);
+            let end = self.worst_margin(loads, &next);
+            // A margin that is not a number is not below 0: such a motion is past all phases.
+            if end >= 0.0 || end.is_nan() {
+                self.motion = next;
+                return;
+            }
+            let start = self.worst_margin(loads, &self.motion).max(0.0);
+            let share = first_below_zero(start, end, |share| {
+                self.worst_margin(loads, &self.step(loads, left * share))
+            });
+            self.motion = self.step(loads, left * share);
+            left *= 1.0 - share;
+            self.stop(loads);
+            self.release(loads);
+        }
+        self.rest();
+        self.motion = self.step(loads, left);
+        self.stop(loads);
+    }
+
+    fn margins(&self, loads: &Loads, motion: &Motion) -> [f64; 2] {
+        let response = || self.laws.response(loads, motion);
+        margins(&self.shafts, self.phases, loads.torque_nm, motion.speed, response)
+    }
+
+    fn worst_margin(&self, loads: &Loads, motion: &Motion) -> f64 {
+        let [left, right] = self.margins(loads, motion);
+        // Unlike min(), keeps a margin that is not a number.
+        if left < right { left } else { right }
+    }
+
+    /// Ends the sliding of shafts that have come to rest or beyond.
+    fn stop(&mut self, loads: &Loads) {
+        let margins = self.margins(loads, &self.motion);
+        for (i, margin) in margins.into_iter().enumerate() {
+            if margin < 0.0 && self.phases[i] != Phase::Stuck {
+                self.motion.speed[i] = 0.0;
+                self.phases[i] = Phase::Stuck;
+            }
+        }
+    }
+
+    /// Lets shafts go that friction cannot hold.
+    fn release(&mut self, loads: &Loads) {
+        if self.phases.contains(&Phase::Stuck) && self.worst_margin(loads, &self.motion) < 0.0 {
+            let response = self.laws.response(loads, &self.motion);
+            self.phases = settled(&self.shafts, self.phases, loads.torque_nm, self.motion.speed, &response);
+        }
+    }
+
+    /// Takes shafts at rest as stuck.
+    fn rest(&mut self) {
+        for (phase, speed) in self.phases.iter_mut().zip(self.motion.speed) {
+            if *phase != Phase::Free && speed == 0.0 {
+                *phase = Phase::Stuck;
+            }
+        }
+    }
+
+    fn step(&self, loads: &Loads, dt: f64) -> Motion {
+        runge_kutta(&self.motion, dt, |at| self.rate(loads, at))
+    }
+
+    #[inline(always)]
+    fn rate(&self, loads: &Loads, at: &Motion) -> Motion {
+        let response = self.laws.response(loads, at);
+        let shaft_nm = shaft_torques(&self.shafts, self.phases, loads.torque_nm, at.speed, &response);
+        let mut acceleration = response.motor_accelerations(shaft_nm);
+        for (acceleration, phase) in acceleration.iter_mut().zip(self.phases) {
+            // Exactly, not only up to rounding, so that the angle keeps its last bit.
+            if phase == Phase::Stuck {
+                *acceleration = 0.0;
+            }
+        }
+        Motion {
+            angle: at.speed,
+            speed: acceleration,
+            lean: at.lean_rate,
+            lean_rate: response.lean_acceleration(shaft_nm),
+            uphill: 0.0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;
