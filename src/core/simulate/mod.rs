@@ -4,6 +4,7 @@
 //! processors: sticking, rounding sensors and an unstable body would make another path of it within
 //! seconds, and a run is to be the same everywhere.
 
+mod bench_plant;
 mod change;
 mod noise;
 mod planar;
@@ -15,6 +16,7 @@ mod sensors;
 mod simulation;
 mod statistics;
 
+pub use bench_plant::BenchPlant;
 pub use planar::{Forcing, PlanarPlant};
 pub use plant::{Plant, Pose};
 pub use response::predicted_response;
