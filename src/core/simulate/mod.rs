@@ -6,6 +6,7 @@
 
 mod bench_plant;
 mod change;
+mod ground;
 mod noise;
 mod planar;
 mod plant;
@@ -17,6 +18,7 @@ mod simulation;
 mod statistics;
 
 pub use bench_plant::BenchPlant;
+pub use ground::Ground;
 pub use planar::{Forcing, PlanarPlant};
 pub use plant::{Plant, Pose};
 pub use response::predicted_response;
