@@ -1,4 +1,4 @@
-//! LQR design: weights, Riccati equation, gain, cost, poles and residual.
+//! LQR design: weights, Riccati equation, gain, cost, poles and residual; margins of the loop as it runs.
 
 mod balance;
 mod care;
@@ -9,9 +9,11 @@ mod double_double;
 mod doubling;
 mod error;
 mod input;
+mod margins;
 mod newton;
 mod poles;
 mod real;
+mod sampled_loop;
 mod search;
 mod sign;
 mod square;
@@ -22,4 +24,5 @@ mod weights;
 pub use care::{CareInput, CareSolution, solve_care};
 pub use design::{LqrDesign, design};
 pub use error::{CareError, DesignError};
+pub use margins::{Margins, SampledLoop, margins};
 pub use weights::Weights;

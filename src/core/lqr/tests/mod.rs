@@ -3,6 +3,7 @@
 mod care;
 mod carex;
 mod design;
+mod margins;
 
 use nalgebra::DMatrix;
 
