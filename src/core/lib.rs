@@ -10,6 +10,7 @@
 //! | [`simulate`] | plant with sticking friction, sensors, scenarios |
 //! | [`record`] | logs: schema, reading, writing, health |
 //! | [`identify`] | friction and inertia from logs |
+//! | [`report`] | what was found, as HTML and as text |
 //! | [`export`] | a controller as C header, JSON, YAML or CSV |
 //! | [`model_file`] | models on disk (TOML) |
 //!
@@ -28,6 +29,7 @@ pub mod lqr;
 pub mod model_file;
 mod parameter;
 pub mod record;
+pub mod report;
 pub mod robot;
 pub mod simulate;
 
