@@ -16,8 +16,8 @@
 //!
 //! # Invariants
 //! - SI units and radians everywhere; a name carries its unit where it has one.
-//! - No clock, no file, no thread, no printing: time and randomness are arguments, readers take
-//!   `BufRead`, writers `Write`.
+//! - No clock, no file, no printing, and no thread outside of [`parallel`]: time and randomness are arguments,
+//!   readers take `BufRead`, writers `Write`.
 //! - Same inputs and seed, same bytes out.
 //! - Nothing here knows the window.
 
@@ -27,6 +27,7 @@ pub mod friction;
 pub mod identify;
 pub mod lqr;
 pub mod model_file;
+pub mod parallel;
 mod parameter;
 pub mod record;
 pub mod report;
