@@ -23,11 +23,16 @@ pub struct Ground {
 
 impl Default for Ground {
     fn default() -> Self {
-        Self { points_m: Vec::new(), contact_patch_m: 0.03 }
+        Self::flat()
     }
 }
 
 impl Ground {
+    /// Level at height 0.
+    pub const fn flat() -> Self {
+        Self { points_m: Vec::new(), contact_patch_m: 0.03 }
+    }
+
     /// A slope between levels: from height 0 at `start_m` to `height_m` after `length_m` of path.
     pub fn ramp(start_m: f64, length_m: f64, height_m: f64) -> Self {
         Self { points_m: vec![[start_m, 0.0], [start_m + length_m, height_m]], ..Self::default() }

@@ -1,16 +1,19 @@
 //! Newton's laws for the whole robot: from where it is and what acts on it to its accelerations.
 
+use super::super::ground::Ground;
 use super::super::planar::Forcing;
 use super::super::planar::near_angle::NearAngle;
+use super::Pose;
+use super::body::Body;
 use super::motion::Motion;
-use crate::robot::RobotParameters;
+use super::terrain::{Footing, Place, Terrain};
+use crate::robot::{Chassis, RobotParameters, State, Surroundings, Tether};
 
 /// What does not change as the robot moves.
 #[derive(Clone, Debug)]
 pub(super) struct Laws {
-    pub(super) radius_m: f64,
+    radius_m: f64,
     per_radius: f64,
-    pub(super) track_m: f64,
     per_track: f64,
     /// b/2r: motor speed of each wheel, outward one forward, for 1 rad/s of yaw.
     yaw_gear: f64,
@@ -28,6 +31,14 @@ pub(super) struct Laws {
     yawing: f64,
     /// M g l, N m.
     weight_nm: f64,
+    /// Angle of the centre of mass in front of the body's axis, with its sine and cosine.
+    com_angle: f64,
+    com_direction: (f64, f64),
+    /// What is added to r (q + lean) to give the way of a wheel, m: motor angles are 0 upright at x = 0.
+    origin_m: f64,
+    tether: Option<Tether>,
+    /// None on level ground, whose steps need none of it.
+    terrain: Option<Terrain>,
 }
 
 /// What acts during one call, with the angles at its start.
@@ -36,6 +47,8 @@ pub(super) struct Loads {
     push_n: f64,
     push_height_m: f64,
     lean: NearAngle,
+    yaw: NearAngle,
+    pieces: [usize; 2],
 }
 
 /// Accelerations without any torque on the shafts, and what 1 N m there adds to them.
@@ -51,6 +64,8 @@ pub(super) struct Response {
     lean_per_sum: f64,
     /// rad/s² for 1 N m of right less left.
     half_difference_per_difference: f64,
+    /// Speed up the slope, m/s.
+    pub(super) uphill: f64,
 }
 
 impl Response {
@@ -93,36 +108,80 @@ impl Response {
 }
 
 impl Laws {
-    pub(super) fn new(parameters: &RobotParameters, track_m: f64, yaw_inertia: f64) -> Self {
+    pub(super) fn new(
+        parameters: &RobotParameters,
+        chassis: &Chassis,
+        surroundings: &Surroundings,
+        grounds: &[Ground; 2],
+    ) -> Self {
         let RobotParameters {
-            body_mass_kg: body,
             wheel_mass_kg: wheel,
             wheel_inertia_kg_m2: spin,
             wheel_radius_m: radius,
-            com_height_m: height,
-            body_inertia_kg_m2: pitch_inertia,
             gravity_m_s2: gravity,
+            ..
         } = *parameters;
+        let body = Body::new(parameters, chassis.yaw_inertia_kg_m2, surroundings.payload);
+        let track_m = chassis.track_width_m;
         let one_wheel = wheel + spin / (radius * radius);
-        let first_moment = body * height;
-        let second_moment = first_moment * height;
+        let first_moment = body.mass_kg * body.com_distance_m;
+        let second_moment = first_moment * body.com_distance_m;
+        let pitching = body.pitch_inertia_kg_m2 + second_moment;
         let half_track = 0.5 * track_m;
+        let slope = libm::sincos(surroundings.slope_rad);
+        let even = slope.0 == 0.0 && grounds.iter().all(Ground::is_flat);
         Self {
             radius_m: radius,
             per_radius: 1.0 / radius,
-            track_m,
             per_track: 1.0 / track_m,
             yaw_gear: half_track / radius,
-            translating: body + 2.0 * one_wheel,
-            pitching: pitch_inertia + second_moment,
+            translating: body.mass_kg + 2.0 * one_wheel,
+            pitching,
             // Without the cancellation of the two products.
-            determinant: 2.0 * one_wheel * (pitch_inertia + second_moment) + body * pitch_inertia,
+            determinant: 2.0 * one_wheel * pitching + body.mass_kg * body.pitch_inertia_kg_m2,
             first_moment,
             second_moment,
             // Each wheel about its diameter: half of its spin, as of a disc.
-            yawing: yaw_inertia + 2.0 * one_wheel * half_track * half_track + spin,
+            yawing: body.yaw_inertia_kg_m2 + 2.0 * one_wheel * half_track * half_track + spin,
             weight_nm: first_moment * gravity,
+            com_angle: body.com_angle_rad,
+            com_direction: libm::sincos(body.com_angle_rad),
+            origin_m: -radius * (body.com_angle_rad + surroundings.slope_rad),
+            tether: surroundings.tether,
+            terrain: (!even).then(|| Terrain::new(grounds, slope, track_m, &body, wheel, gravity)),
         }
+    }
+
+    /// The motion of a robot in a state, with heading 0 and without yaw rate.
+    pub(super) fn motion(&self, start: &State) -> Motion {
+        Motion {
+            angle: [start.x_m / self.radius_m - start.pitch_rad; 2],
+            speed: [start.x_dot_m_s / self.radius_m - start.pitch_rate_rad_s; 2],
+            lean: start.pitch_rad + self.slope_ahead(0.0) + self.com_angle,
+            lean_rate: start.pitch_rate_rad_s,
+            uphill: start.x_m,
+        }
+    }
+
+    pub(super) fn pose(&self, at: &Motion) -> Pose {
+        let (x_dot_m_s, yaw_rate_rad_s) = self.forward_and_yaw(at);
+        let [left, right] = self.distances(at);
+        let yaw_rad = self.yaw(at);
+        let state = State {
+            x_m: 0.5 * (left + right),
+            x_dot_m_s,
+            pitch_rad: at.lean - self.com_angle - self.slope_ahead(yaw_rad),
+            pitch_rate_rad_s: at.lean_rate,
+        };
+        let (roll_rad, ground_height_m) = self
+            .terrain
+            .as_ref()
+            .map_or((0.0, [0.0; 2]), |t| t.roll_and_heights([left, right], yaw_rad, at.uphill));
+        Pose { state, yaw_rad, yaw_rate_rad_s, roll_rad, ground_height_m }
+    }
+
+    fn slope_ahead(&self, yaw: f64) -> f64 {
+        self.terrain.as_ref().map_or(0.0, |terrain| terrain.slope_ahead(yaw))
     }
 
     pub(super) fn loads(&self, forcing: &Forcing, at: &Motion) -> Loads {
@@ -131,34 +190,80 @@ impl Laws {
             push_n: forcing.push_n,
             push_height_m: forcing.push_height_m,
             lean: NearAngle::new(at.lean),
+            yaw: NearAngle::new(self.yaw(at)),
+            pieces: self.terrain.as_ref().map_or([0; 2], |terrain| terrain.pieces_at(self.distances(at))),
         }
+    }
+
+    /// Heading, rad.
+    #[inline(always)]
+    fn yaw(&self, at: &Motion) -> f64 {
+        self.radius_m * self.per_track * (at.angle[1] - at.angle[0])
+    }
+
+    /// Ways of both wheels along their paths, m.
+    #[inline(always)]
+    fn distances(&self, at: &Motion) -> [f64; 2] {
+        [0, 1].map(|i: usize| self.radius_m * (at.angle[i] + at.lean) + self.origin_m)
     }
 
     /// Speeds of both wheels along their paths, m/s.
     #[inline(always)]
-    pub(super) fn wheel_speeds(&self, at: &Motion) -> [f64; 2] {
-        [self.radius_m * (at.speed[0] + at.lean_rate), self.radius_m * (at.speed[1] + at.lean_rate)]
+    fn wheel_speeds(&self, at: &Motion) -> [f64; 2] {
+        [0, 1].map(|i: usize| self.radius_m * (at.speed[i] + at.lean_rate))
     }
 
     /// Speed of the axle's middle, m/s, and yaw rate, rad/s.
     #[inline(always)]
-    pub(super) fn forward_and_yaw(&self, at: &Motion) -> (f64, f64) {
+    fn forward_and_yaw(&self, at: &Motion) -> (f64, f64) {
         let [left, right] = self.wheel_speeds(at);
         (0.5 * (left + right), (right - left) * self.per_track)
     }
 
+    /// Sine and cosine of the body's own axis from those of the line to its centre of mass.
+    #[inline(always)]
+    fn body_axis(&self, (sin, cos): (f64, f64)) -> (f64, f64) {
+        let (s, c) = self.com_direction;
+        (sin * c - cos * s, cos * c + sin * s)
+    }
+
+    fn place(&self, at: &Motion, lean: (f64, f64), yaw: (f64, f64)) -> Place {
+        Place { distance: self.distances(at), wheel_speed: self.wheel_speeds(at), lean, yaw }
+    }
+
+    #[inline(always)]
+    fn footing(&self, loads: &Loads, at: &Motion, lean: (f64, f64)) -> (Footing, f64) {
+        let Some(terrain) = &self.terrain else {
+            let about = self.weight_nm * lean.0;
+            return (Footing { tilt: (0.0, 1.0), tilt_rate: 0.0, along: 0.0, about, turning: 0.0 }, 0.0);
+        };
+        let yaw = if terrain.is_level() { (0.0, 1.0) } else { loads.yaw.sin_cos(self.yaw(at)) };
+        let (forward, _) = self.forward_and_yaw(at);
+        (terrain.footing(&self.place(at, lean, yaw), loads.pieces), forward * yaw.1)
+    }
+
     #[inline(always)]
     pub(super) fn response(&self, loads: &Loads, at: &Motion) -> Response {
-        let (sin, cos) = loads.lean.sin_cos(at.lean);
+        let lean = loads.lean.sin_cos(at.lean);
         let (forward, yaw_rate) = self.forward_and_yaw(at);
+        let (footing, uphill) = self.footing(loads, at, lean);
+        // Against the path, which the ground may tilt.
+        let (sin, cos) = (
+            lean.0 * footing.tilt.1 + lean.1 * footing.tilt.0,
+            lean.1 * footing.tilt.1 - lean.0 * footing.tilt.0,
+        );
         let (rate, spin) = (at.lean_rate, yaw_rate * yaw_rate);
         let moment_sin = self.first_moment * sin;
         let moment_cos = self.first_moment * cos;
         let swing = self.second_moment * sin * cos;
 
-        let along = moment_sin * (rate * rate + spin) + loads.push_n;
-        let about = self.weight_nm * sin + swing * spin + loads.push_height_m * cos * loads.push_n;
-        let turning = -(moment_sin * forward + 2.0 * swing * rate) * yaw_rate;
+        let (pull_along, pull_about) = self.tether_pull(at, lean);
+        let push_about = loads.push_height_m * self.body_axis((sin, cos)).1 * loads.push_n;
+        let along = moment_sin * (rate * rate + spin) + loads.push_n + footing.along + pull_along;
+        let about =
+            swing * spin + moment_sin * forward * footing.tilt_rate + footing.about + push_about + pull_about;
+        let turning =
+            footing.turning - (moment_sin * forward + swing * (2.0 * rate + footing.tilt_rate)) * yaw_rate;
 
         // A v̇ + C θ̈ = along, C v̇ + D θ̈ = about; A D − C² without its cancellation when upright
         let inverse =
@@ -176,18 +281,47 @@ impl Laws {
             mean_per_sum: forward_per_sum * self.per_radius - lean_per_sum,
             lean_per_sum,
             half_difference_per_difference: self.yaw_gear * self.yaw_gear * yaw_inverse,
+            uphill,
         }
     }
 
-    /// Kinetic and potential energy, J, 0 when upright at rest.
+    /// Force of the tether along the path, N, and its moment on the pitch, N m.
+    #[inline(always)]
+    fn tether_pull(&self, at: &Motion, lean: (f64, f64)) -> (f64, f64) {
+        let Some(tether) = &self.tether else { return (0.0, 0.0) };
+        let axis = self.body_axis(lean);
+        let force = -tether.stiffness_n_m * self.stretch(tether, at, axis);
+        (force, force * tether.height_m * axis.1)
+    }
+
+    /// Length of the tether beyond its slack, m; its sign is the side of the anchor that the robot is on.
+    #[inline(always)]
+    fn stretch(&self, tether: &Tether, at: &Motion, body_axis: (f64, f64)) -> f64 {
+        let [left, right] = self.distances(at);
+        let away = 0.5 * (left + right) + tether.height_m * body_axis.0 - tether.anchor_m;
+        (away.abs() - tether.slack_m).max(0.0).copysign(away)
+    }
+
+    /// Kinetic and potential energy, J: 0 when upright at rest on level ground at height 0 without payload.
     pub(super) fn energy_j(&self, at: &Motion) -> f64 {
-        let (sin, cos) = libm::sincos(at.lean);
+        let lean = libm::sincos(at.lean);
+        let place = self.place(at, lean, libm::sincos(self.yaw(at)));
+        let potential = match &self.terrain {
+            Some(terrain) => terrain.energy_j(&place, at.uphill),
+            None => self.weight_nm * (lean.1 - 1.0),
+        };
+        let stretch = |tether: &Tether| self.stretch(tether, at, self.body_axis(lean));
+        let tether =
+            self.tether.as_ref().map_or(0.0, |tether| 0.5 * tether.stiffness_n_m * stretch(tether).powi(2));
+        let (tilt_sin, tilt_cos) = self.terrain.as_ref().map_or((0.0, 1.0), |terrain| terrain.tilt(&place));
+        let (sin, cos) = (lean.0 * tilt_cos + lean.1 * tilt_sin, lean.1 * tilt_cos - lean.0 * tilt_sin);
         let (forward, yaw_rate) = self.forward_and_yaw(at);
         let rate = at.lean_rate;
-        0.5 * self.translating * forward * forward
+        potential
+            + tether
+            + 0.5 * self.translating * forward * forward
             + self.first_moment * cos * forward * rate
             + 0.5 * self.pitching * rate * rate
             + 0.5 * (self.yawing + self.second_moment * sin * sin) * yaw_rate * yaw_rate
-            + self.weight_nm * (cos - 1.0)
     }
 }

@@ -24,14 +24,17 @@
 //! Slip of the tyres, their springiness and the turning torque of their contact patches; motion of the
 //! legs; the difference between the body's inertias about its own long and fore-and-aft axes.
 
+mod body;
 mod laws;
 mod motion;
 mod shafts;
+mod terrain;
 
 use super::change::first_below_zero;
+use super::ground::Ground;
 use super::planar::Forcing;
-use crate::friction::Stribeck;
-use crate::robot::{RobotParameters, State};
+use crate::model_file::RobotModel;
+use crate::robot::State;
 use laws::{Laws, Loads};
 use motion::{Motion, runge_kutta};
 use shafts::{Phase, Phases, Shaft, margins, settled, shaft_torques};
@@ -64,22 +67,18 @@ pub struct Pose {
 }
 
 impl Plant {
-    /// A robot at `start` with heading 0 and no yaw rate. The parameters are taken as validated.
-    pub fn new(
-        parameters: &RobotParameters,
-        friction: [Option<Stribeck>; 2],
-        (track_width_m, yaw_inertia_kg_m2): (f64, f64),
-        start: &State,
-    ) -> Self {
-        let laws = Laws::new(parameters, track_width_m, yaw_inertia_kg_m2);
-        let shafts = friction.map(Shaft::new);
-        let motion = Motion {
-            angle: [start.x_m / parameters.wheel_radius_m - start.pitch_rad; 2],
-            speed: [parameters.motor_speed_rad_s(start); 2],
-            lean: start.pitch_rad,
-            lean_rate: start.pitch_rate_rad_s,
-            uphill: start.x_m,
-        };
+    /// A robot with its model's surroundings, at `start` with heading 0 and no yaw rate. The model is taken
+    /// as validated.
+    pub fn new(robot: &RobotModel, start: &State) -> Self {
+        Self::on_ground(robot, &[const { Ground::flat() }; 2], start)
+    }
+
+    /// The same with a ground of its own under the left and the right wheel, on top of the surroundings'
+    /// slope.
+    pub fn on_ground(robot: &RobotModel, grounds: &[Ground; 2], start: &State) -> Self {
+        let laws = Laws::new(&robot.parameters, &robot.chassis, &robot.surroundings, grounds);
+        let shafts = robot.friction.map(Shaft::new);
+        let motion = laws.motion(start);
         let phases = [0, 1].map(|i: usize| shafts[i].phase_at(motion.speed[i]));
         Self { laws, shafts, motion, phases }
     }
@@ -98,25 +97,12 @@ impl Plant {
 
     /// The true state.
     pub fn state(&self) -> State {
-        let Motion { angle, speed, lean, lean_rate, .. } = self.motion;
-        State {
-            x_m: self.laws.radius_m * (0.5 * (angle[0] + angle[1]) + lean),
-            x_dot_m_s: self.laws.radius_m * (0.5 * (speed[0] + speed[1]) + lean_rate),
-            pitch_rad: lean,
-            pitch_rate_rad_s: lean_rate,
-        }
+        self.pose().state
     }
 
-    /// The true state with heading and roll.
+    /// The true state with heading, roll and the ground below.
     pub fn pose(&self) -> Pose {
-        let [left, right] = self.motion.angle;
-        let (_, yaw_rate_rad_s) = self.laws.forward_and_yaw(&self.motion);
-        Pose {
-            state: self.state(),
-            yaw_rad: self.laws.radius_m * (right - left) / self.laws.track_m,
-            yaw_rate_rad_s,
-            ..Pose::default()
-        }
+        self.laws.pose(&self.motion)
     }
 
     /// Motor angles q, left and right, rad: 0 with the robot upright at x = 0.
@@ -192,7 +178,14 @@ impl Plant {
 
     /// Lets shafts go that friction cannot hold.
     fn release(&mut self, loads: &Loads) {
-        if self.phases.contains(&Phase::Stuck) && self.worst_margin(loads, &self.motion) < 0.0 {
+        if !self.phases.contains(&Phase::Stuck) {
+            return;
+        }
+        let margin = self.worst_margin(loads, &self.motion);
+        if margin.is_nan() {
+            // Nothing holds what is not a number; it shows in the speed.
+            self.phases = [Phase::Free; 2];
+        } else if margin < 0.0 {
             let response = self.laws.response(loads, &self.motion);
             self.phases = settled(&self.shafts, self.phases, loads.torque_nm, self.motion.speed, &response);
         }
@@ -227,7 +220,7 @@ impl Plant {
             speed: acceleration,
             lean: at.lean_rate,
             lean_rate: response.lean_acceleration(shaft_nm),
-            uphill: 0.0,
+            uphill: response.uphill,
         }
     }
 }

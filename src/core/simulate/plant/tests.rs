@@ -1,5 +1,6 @@
 use super::*;
-use crate::friction::StribeckParameters;
+use crate::friction::{Stribeck, StribeckParameters};
+use crate::robot::RobotParameters;
 use crate::simulate::PlanarPlant;
 
 const ROBOT: RobotParameters = RobotParameters {
@@ -11,7 +12,11 @@ const ROBOT: RobotParameters = RobotParameters {
     body_inertia_kg_m2: 0.12,
     gravity_m_s2: 9.81,
 };
-const CHASSIS: (f64, f64) = (0.4, 0.15);
+
+/// The robot on level ground with nothing around it.
+fn plain(friction: [Option<Stribeck>; 2], start: &State) -> Plant {
+    Plant::new(&RobotModel { friction, ..RobotModel::new(ROBOT) }, start)
+}
 
 fn motor(parameters: [f64; 6]) -> Option<Stribeck> {
     let [coulomb_nm, static_nm, viscous_nm_s_rad, stribeck_speed_rad_s, stribeck_exponent, offset_nm] =
@@ -44,7 +49,7 @@ fn pitched(pitch_rad: f64) -> State {
 
 #[test]
 fn without_friction_and_torque_energy_is_kept_while_spinning() {
-    let mut plant = Plant::new(&ROBOT, [None; 2], CHASSIS, &pitched(0.3));
+    let mut plant = plain([None; 2], &pitched(0.3));
     plant.advance(&torque(-2.0, 2.0), 0.2, 2000);
     let energy = plant.energy_j();
     let mut fastest: f64 = 0.0;
@@ -67,7 +72,7 @@ fn feedback(state: &State, tick: i32) -> f64 {
 fn equal_motors_without_yaw_move_as_the_planar_robot() {
     for friction in [None, motor(LEFT)] {
         let start = State { x_dot_m_s: 0.1, ..pitched(0.05) };
-        let mut whole = Plant::new(&ROBOT, [friction; 2], CHASSIS, &start);
+        let mut whole = plain([friction; 2], &start);
         let mut planar = PlanarPlant::new(&ROBOT, [friction; 2], &start);
         let mut stops = 0;
         for tick in 0..5000 {
@@ -91,7 +96,7 @@ fn equal_motors_without_yaw_move_as_the_planar_robot() {
 
 #[test]
 fn unequal_friction_turns_the_robot() {
-    let mut plant = Plant::new(&ROBOT, table_4(), CHASSIS, &pitched(0.0));
+    let mut plant = plain(table_4(), &pitched(0.0));
     for _ in 0..1000 {
         let state = plant.state();
         let nm = 0.6 * (state.x_dot_m_s - 0.3) + 8.5 * state.pitch_rad + state.pitch_rate_rad_s;
