@@ -4,6 +4,7 @@
 //! processors: sticking, rounding sensors and an unstable body would make another path of it within
 //! seconds, and a run is to be the same everywhere.
 
+mod actuator;
 mod bench_plant;
 mod change;
 mod ground;
@@ -17,6 +18,7 @@ mod sensors;
 mod simulation;
 mod statistics;
 
+pub use actuator::Actuator;
 pub use bench_plant::BenchPlant;
 pub use ground::Ground;
 pub use planar::{Forcing, PlanarPlant};
