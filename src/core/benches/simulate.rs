@@ -8,7 +8,7 @@ use flqr_core::control::{BalanceController, ControllerKind};
 use flqr_core::lqr;
 use flqr_core::model_file::{Model, RobotModel};
 use flqr_core::robot::State;
-use flqr_core::simulate::{Forcing, PlanarPlant, Simulation, SimulationSettings};
+use flqr_core::simulate::{Forcing, PlanarPlant, Plant, Simulation, SimulationSettings};
 
 fn main() {
     divan::main();
@@ -33,6 +33,28 @@ fn plant(bencher: Bencher, substeps: u32) {
             for _ in 0..TICKS {
                 let torque = -(gain * plant.state().to_vector());
                 let forcing = Forcing { torque_nm: torque.into(), ..Forcing::default() };
+                plant.advance(&forcing, 1e-3, substeps);
+            }
+            plant.state()
+        },
+    );
+}
+
+/// 1000 ticks of the whole robot with yaw under the same feedback, by substeps; the robot turns, so that
+/// its wheels differ.
+#[divan::bench(args = [4, 10])]
+fn whole_plant(bencher: Bencher, substeps: u32) {
+    let robot = paper();
+    let gain = gain(&robot);
+    let start = Plant::new(&robot, &pitched());
+    bencher.counter(divan::counter::ItemsCount::new(TICKS)).with_inputs(|| start.clone()).bench_values(
+        |mut plant| {
+            for _ in 0..TICKS {
+                let pose = plant.pose();
+                let torque = -(gain * pose.state.to_vector());
+                let turn = 0.5 * (1.0 - pose.yaw_rate_rad_s);
+                let forcing =
+                    Forcing { torque_nm: [torque[0] - turn, torque[1] + turn], ..Forcing::default() };
                 plant.advance(&forcing, 1e-3, substeps);
             }
             plant.state()
