@@ -8,13 +8,18 @@
 //! forward, sliding backward, stuck) the motion is smooth and a Runge-Kutta step of order 4 serves; the
 //! instant of a change is located inside the step. A time-stepping complementarity method would need
 //! no events but is of first order; events are rare here, and order 4 keeps energy to rounding.
+//!
+//! A step is a chain in which each stage waits for the friction at the speed that the stage before gave; what
+//! else a stage needs (sine, cosine, one division) depends on earlier stages only and runs beside it. So
+//! the chain is kept short: table, cubic, one product and one difference.
 
 use std::ops::RangeInclusive;
 
+use super::laws::{Laws, Loads, Motion, runge_kutta};
 use super::near_angle::NearAngle;
 use super::sliding::SlidingFriction;
 use crate::friction::Stribeck;
-use crate::robot::{Accelerations, Coefficients, RobotParameters, State};
+use crate::robot::{RobotParameters, State};
 
 /// Changes of phase within one substep after which the shafts are taken as stuck for the rest of it.
 const MAX_CHANGES: usize = 8;
@@ -36,28 +41,12 @@ pub struct Forcing {
 #[derive(Clone, Debug)]
 pub struct PlanarPlant {
     laws: Laws,
-    motion: Motion,
-    phase: Phase,
-}
-
-/// What does not change as the robot moves.
-#[derive(Clone, Debug)]
-struct Laws {
-    coefficients: Coefficients,
-    radius_m: f64,
-    per_radius: f64,
     sliding: SlidingFriction,
     /// Sum of both motors' ranges at rest, N m; none where no torque is needed to turn a resting shaft.
     stick_range_nm: Option<RangeInclusive<f64>>,
-}
-
-/// q, q̇, θ, θ̇; also their rates of change.
-#[derive(Clone, Copy, Debug)]
-struct Motion {
-    angle: f64,
-    speed: f64,
-    pitch: f64,
-    pitch_rate: f64,
+    motion: Motion,
+    phase: Phase,
+    near: NearAngle,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,32 +59,29 @@ enum Phase {
     Stuck,
 }
 
-/// The loads of one tick, with the pitch at its start.
-struct Loads {
-    torque_nm: f64,
-    push_n: f64,
-    push_height_m: f64,
-    start: NearAngle,
-}
-
 impl PlanarPlant {
     /// A robot at `state`. The parameters are taken as validated.
     pub fn new(parameters: &RobotParameters, friction: [Option<Stribeck>; 2], state: &State) -> Self {
-        let laws = Laws::new(parameters, &friction);
+        let curves = || friction.iter().flatten();
+        let low: f64 = curves().map(|curve| *curve.stick_range_nm().start()).sum();
+        let high: f64 = curves().map(|curve| *curve.stick_range_nm().end()).sum();
+        let stick_range_nm = (high > low).then_some(low..=high);
+        let sliding = SlidingFriction::new(curves().copied());
+        let laws = Laws::new(parameters, sliding.viscous_nm_s_rad, sliding.offset_nm);
         let motion = Motion {
             angle: state.x_m / parameters.wheel_radius_m - state.pitch_rad,
             speed: parameters.motor_speed_rad_s(state),
             pitch: state.pitch_rad,
             pitch_rate: state.pitch_rate_rad_s,
         };
-        let phase = if laws.stick_range_nm.is_none() {
+        let phase = if stick_range_nm.is_none() {
             Phase::Free
         } else if motion.speed == 0.0 {
             Phase::Stuck
         } else {
             Phase::Slide(motion.speed.signum())
         };
-        Self { laws, motion, phase }
+        Self { laws, sliding, stick_range_nm, motion, phase, near: NearAngle::new(state.pitch_rad) }
     }
 
     /// The true state.
@@ -126,38 +112,59 @@ impl PlanarPlant {
 
     /// Moves on by `dt_s` in `substeps` equal steps of order 4.
     pub fn advance(&mut self, forcing: &Forcing, dt_s: f64, substeps: u32) {
+        self.advance_on(pulp::Arch::new(), forcing, dt_s, substeps);
+    }
+
+    /// Newer encodings of the same operations need fewer instructions; the bytes are the same.
+    fn advance_on(&mut self, arch: pulp::Arch, forcing: &Forcing, dt_s: f64, substeps: u32) {
         let loads = Loads {
             torque_nm: forcing.torque_nm.iter().sum(),
-            push_n: forcing.push_n,
-            push_height_m: forcing.push_height_m,
-            start: NearAngle::new(self.motion.pitch),
+            along_nm: self.laws.radius_m * forcing.push_n,
+            about_nm: forcing.push_height_m * forcing.push_n,
         };
         let step = dt_s / f64::from(substeps);
-        for _ in 0..substeps {
-            self.substep(&loads, step);
+        arch.dispatch(Advance { plant: self, loads, step, substeps });
+    }
+
+    /// New loads may be more than friction holds.
+    #[inline(always)]
+    fn begin(&mut self, loads: &Loads) {
+        if self.phase == Phase::Stuck && self.margin(loads, &self.motion) < 0.0 {
+            self.leave(loads);
         }
     }
 
+    #[inline(always)]
     fn substep(&mut self, loads: &Loads, step: f64) {
+        self.near.follow(self.motion.pitch);
+        let next = self.runge_kutta(loads, step, NearAngle::rotated);
+        if self.margin(loads, &next) >= 0.0 && self.near.reaches(next.pitch) {
+            self.motion = next;
+        } else {
+            self.substep_with_changes(loads, step);
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn substep_with_changes(&mut self, loads: &Loads, step: f64) {
         let mut left = step;
         for _ in 0..MAX_CHANGES {
-            if self.phase == Phase::Stuck && self.margin(loads, &self.motion) < 0.0 {
-                self.leave(loads);
-            }
-            let next = self.runge_kutta(loads, left);
+            self.begin(loads);
+            let next = self.runge_kutta(loads, left, NearAngle::sin_cos);
             if self.margin(loads, &next) >= 0.0 {
                 self.motion = next;
                 return;
             }
             let share = self.locate_change(loads, left, &next);
-            self.motion = self.runge_kutta(loads, left * share);
+            self.motion = self.runge_kutta(loads, left * share, NearAngle::sin_cos);
             left *= 1.0 - share;
             if self.phase != Phase::Stuck {
                 self.stop();
             }
         }
         self.stop();
-        self.motion = self.runge_kutta(loads, left);
+        self.motion = self.runge_kutta(loads, left, NearAngle::sin_cos);
     }
 
     fn stop(&mut self) {
@@ -166,19 +173,22 @@ impl PlanarPlant {
     }
 
     /// From stuck to sliding, in the direction of the torque that friction could not hold.
+    #[cold]
+    #[inline(never)]
     fn leave(&mut self, loads: &Loads) {
-        let (needed, _) = self.laws.held(loads, &self.motion);
-        let forward = self.laws.stick_range_nm.as_ref().is_some_and(|range| needed > *range.end());
+        let (needed, _) = self.held(loads, &self.motion);
+        let forward = self.stick_range_nm.as_ref().is_some_and(|range| needed > *range.end());
         self.phase = Phase::Slide(if forward { 1.0 } else { -1.0 });
     }
 
     /// At least 0 as long as the present phase goes on: the speed in the direction of sliding, or the
     /// distance of the holding torque from the nearer end of its range.
+    #[inline(always)]
     fn margin(&self, loads: &Loads, motion: &Motion) -> f64 {
-        match (self.phase, &self.laws.stick_range_nm) {
+        match (self.phase, &self.stick_range_nm) {
             (Phase::Slide(direction), _) => direction * motion.speed,
             (Phase::Stuck, Some(range)) => {
-                let (needed, _) = self.laws.held(loads, motion);
+                let (needed, _) = self.held(loads, motion);
                 (range.end() - needed).min(needed - range.start())
             }
             (Phase::Free, _) | (Phase::Stuck, None) => f64::INFINITY,
@@ -187,6 +197,7 @@ impl PlanarPlant {
 
     /// Share of the step `dt` at which the phase has just ended: between 0, where it holds, and 1, where
     /// it does not (`end`), by secants with a bisection after each that was slow.
+    #[inline(never)]
     fn locate_change(&self, loads: &Loads, dt: f64, end: &Motion) -> f64 {
         let mut holds = (0.0, self.margin(loads, &self.motion));
         let mut ended = (1.0, self.margin(loads, end));
@@ -200,7 +211,7 @@ impl PlanarPlant {
                 let secant = holds.0 + width * holds.1 / (holds.1 - ended.1);
                 (secant + 0.4 * INSTANT_TOLERANCE).clamp(holds.0, ended.0)
             };
-            let margin = self.margin(loads, &self.runge_kutta(loads, dt * share));
+            let margin = self.margin(loads, &self.runge_kutta(loads, dt * share, NearAngle::sin_cos));
             if margin >= 0.0 {
                 holds = (share, margin);
             } else {
@@ -211,141 +222,57 @@ impl PlanarPlant {
         ended.0
     }
 
-    fn runge_kutta(&self, loads: &Loads, dt: f64) -> Motion {
-        let laws = &self.laws;
+    /// Inlined into one loop-free step for each phase, which makes a step twice as fast.
+    #[inline(always)]
+    fn runge_kutta(&self, loads: &Loads, dt: f64, sin_cos: impl Fn(&NearAngle, f64) -> (f64, f64)) -> Motion {
+        let Self { laws, near, sliding, .. } = self;
         match self.phase {
-            Phase::Free => runge_kutta(&self.motion, dt, &Free { laws, loads }),
-            Phase::Slide(direction) => runge_kutta(&self.motion, dt, &Sliding { laws, loads, direction }),
-            Phase::Stuck => runge_kutta(&self.motion, dt, &Held { laws, loads }),
-        }
-    }
-}
-
-/// The smooth motion of one phase. Everything below is inlined into one loop-free step for each phase,
-/// which makes a step twice as fast.
-trait Smooth {
-    /// q̈ and θ̈, rad/s².
-    fn accelerations(&self, at: &Motion) -> (f64, f64);
-
-    #[inline(always)]
-    fn rate(&self, at: &Motion) -> Motion {
-        let (speed, pitch_rate) = self.accelerations(at);
-        Motion { angle: at.speed, speed, pitch: at.pitch_rate, pitch_rate }
-    }
-}
-
-struct Free<'a> {
-    laws: &'a Laws,
-    loads: &'a Loads,
-}
-
-struct Sliding<'a> {
-    laws: &'a Laws,
-    loads: &'a Loads,
-    direction: f64,
-}
-
-struct Held<'a> {
-    laws: &'a Laws,
-    loads: &'a Loads,
-}
-
-impl Smooth for Free<'_> {
-    #[inline(always)]
-    fn accelerations(&self, at: &Motion) -> (f64, f64) {
-        self.laws.sliding(self.loads, at, at.speed.signum())
-    }
-}
-
-impl Smooth for Sliding<'_> {
-    #[inline(always)]
-    fn accelerations(&self, at: &Motion) -> (f64, f64) {
-        self.laws.sliding(self.loads, at, self.direction)
-    }
-}
-
-impl Smooth for Held<'_> {
-    #[inline(always)]
-    fn accelerations(&self, at: &Motion) -> (f64, f64) {
-        // q̈ = 0 exactly, not only up to rounding, so that the angle keeps its last bit.
-        (0.0, self.laws.held(self.loads, at).1)
-    }
-}
-
-/// One classical step of order 4.
-#[inline(always)]
-fn runge_kutta(start: &Motion, dt: f64, law: &impl Smooth) -> Motion {
-    let k1 = law.rate(start);
-    let k2 = law.rate(&start.moved(&k1, 0.5 * dt));
-    let k3 = law.rate(&start.moved(&k2, 0.5 * dt));
-    let k4 = law.rate(&start.moved(&k3, dt));
-    let mean = |pick: fn(&Motion) -> f64| pick(&k1) + 2.0 * (pick(&k2) + pick(&k3)) + pick(&k4);
-    let six_rates = Motion {
-        angle: mean(|k| k.angle),
-        speed: mean(|k| k.speed),
-        pitch: mean(|k| k.pitch),
-        pitch_rate: mean(|k| k.pitch_rate),
-    };
-    start.moved(&six_rates, dt / 6.0)
-}
-
-impl Motion {
-    #[inline(always)]
-    fn moved(&self, rate: &Self, dt: f64) -> Self {
-        Self {
-            angle: self.angle + dt * rate.angle,
-            speed: self.speed + dt * rate.speed,
-            pitch: self.pitch + dt * rate.pitch,
-            pitch_rate: self.pitch_rate + dt * rate.pitch_rate,
-        }
-    }
-}
-
-impl Laws {
-    fn new(parameters: &RobotParameters, friction: &[Option<Stribeck>; 2]) -> Self {
-        let curves = || friction.iter().flatten();
-        let low: f64 = curves().map(|curve| *curve.stick_range_nm().start()).sum();
-        let high: f64 = curves().map(|curve| *curve.stick_range_nm().end()).sum();
-        Self {
-            coefficients: parameters.coefficients(),
-            radius_m: parameters.wheel_radius_m,
-            per_radius: 1.0 / parameters.wheel_radius_m,
-            sliding: SlidingFriction::new(curves().copied()),
-            stick_range_nm: (high > low).then_some(low..=high),
+            Phase::Free => runge_kutta(
+                &self.motion,
+                dt,
+                #[inline(always)]
+                |at| laws.sliding(loads, sin_cos(near, at.pitch), at, at.speed.signum(), sliding),
+            ),
+            Phase::Slide(direction) => runge_kutta(
+                &self.motion,
+                dt,
+                #[inline(always)]
+                |at| laws.sliding(loads, sin_cos(near, at.pitch), at, direction, sliding),
+            ),
+            // q̈ = 0 exactly, not only up to rounding, so that the angle keeps its last bit.
+            Phase::Stuck => runge_kutta(
+                &self.motion,
+                dt,
+                #[inline(always)]
+                |at| (0.0, laws.held(loads, sin_cos(near, at.pitch), at).1),
+            ),
         }
     }
 
-    /// q̈ and θ̈ of shafts that slide in `direction`, rad/s².
     #[inline(always)]
-    fn sliding(&self, loads: &Loads, motion: &Motion, direction: f64) -> (f64, f64) {
-        let (coasting, per_nm) = self.accelerations(loads, motion);
-        let shaft_nm = loads.torque_nm - self.sliding.torque_nm(motion.speed, direction);
-        (coasting.0 + shaft_nm * per_nm.0, coasting.1 + shaft_nm * per_nm.1)
+    fn held(&self, loads: &Loads, at: &Motion) -> (f64, f64) {
+        self.laws.held(loads, self.near.sin_cos(at.pitch), at)
     }
+}
 
-    /// Friction summed over both motors, N m, that keeps q̈ = 0, and θ̈ under it, rad/s². The motors'
-    /// torque does not enter θ̈: between locked wheels and body it is internal.
-    #[inline(always)]
-    fn held(&self, loads: &Loads, motion: &Motion) -> (f64, f64) {
-        let (coasting, per_nm) = self.accelerations(loads, motion);
-        let shaft_nm = -coasting.0 / per_nm.0;
-        (loads.torque_nm - shaft_nm, coasting.1 + shaft_nm * per_nm.1)
-    }
+/// The substeps of one call, compiled for each instruction set.
+struct Advance<'a> {
+    plant: &'a mut PlanarPlant,
+    loads: Loads,
+    step: f64,
+    substeps: u32,
+}
 
-    /// q̈ and θ̈ without any torque between body and wheels, rad/s², and what 1 N m there adds to them:
-    /// Eqs. 4 and 5 are linear in it, and without gravity and spin its effect alone is left.
+impl pulp::WithSimd for Advance<'_> {
+    type Output = ();
+
     #[inline(always)]
-    fn accelerations(&self, loads: &Loads, motion: &Motion) -> ((f64, f64), (f64, f64)) {
-        let (sin, cos) = loads.start.sin_cos(motion.pitch);
-        let relative = |found: Accelerations| {
-            let pitch = found.pitch_accel_rad_s2;
-            (found.x_ddot_m_s2 * self.per_radius - pitch, pitch)
-        };
-        let along = self.radius_m * loads.push_n;
-        let about = loads.push_height_m * cos * loads.push_n;
-        let coasting = self.coefficients.accelerations((sin, cos), motion.pitch_rate, along, about);
-        let per_nm = self.coefficients.accelerations((0.0, cos), 0.0, 1.0, -1.0);
-        (relative(coasting), relative(per_nm))
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let Self { plant, loads, step, substeps } = self;
+        plant.begin(&loads);
+        for _ in 0..substeps {
+            plant.substep(&loads, step);
+        }
     }
 }
 

@@ -1,13 +1,15 @@
 //! Friction of turning shafts, tabulated: Eq. 28 costs two powers and two exponentials at every evaluation of
 //! the dynamics, which would be most of the simulation's time.
 
+use super::laws::Level;
+use super::number::Number;
 use crate::friction::Stribeck;
 
 /// Cells of the table in each octave of speed, as a power of two.
 const CELL_BITS: u32 = 6;
 /// Lowest tabulated speed, 2⁻³⁰ rad/s, and the number of octaves above it: up to 1024 rad/s.
-const LOWEST_EXPONENT: i32 = -30;
-const OCTAVES: usize = 40;
+const LOWEST_BITS: u64 = (1023 - 30) << (f64::MANTISSA_DIGITS - 1);
+const CELLS: u64 = 40 << CELL_BITS;
 /// Bits of a float below a cell's index.
 const WITHIN_BITS: u32 = f64::MANTISSA_DIGITS - 1 - CELL_BITS;
 
@@ -15,26 +17,25 @@ const WITHIN_BITS: u32 = f64::MANTISSA_DIGITS - 1 - CELL_BITS;
 #[derive(Clone, Debug)]
 pub(in crate::simulate) struct SlidingFriction {
     curves: Vec<Stribeck>,
-    viscous_nm_s_rad: f64,
-    offset_nm: f64,
-    /// Cubic of each cell in the share of the cell, from the lowest power up. Cells are spaced as floats
-    /// are, finer towards zero, where the curve is steepest.
+    pub(super) viscous_nm_s_rad: f64,
+    pub(super) offset_nm: f64,
+    /// Cubic of each cell in the speed t above its lower end: factors of 1, t², t, t³, so that those used
+    /// alike lie side by side. Cells are spaced as floats are, finer towards zero, where the curve is
+    /// steepest.
     cells: Vec<[f64; 4]>,
-    lowest_bits: u64,
 }
 
 impl SlidingFriction {
     pub(in crate::simulate) fn new(curves: impl IntoIterator<Item = Stribeck>) -> Self {
         let curves: Vec<Stribeck> = curves.into_iter().collect();
-        let lowest_bits = 2.0_f64.powi(LOWEST_EXPONENT).to_bits();
-        let count = if curves.is_empty() { 0 } else { (OCTAVES as u64) << CELL_BITS };
-        let cells = (0..count).map(|cell| cubic(&curves, lowest_bits + (cell << WITHIN_BITS))).collect();
+        let nodes: Vec<Node> =
+            (0..=CELLS).map(|node| Node::new(&curves, LOWEST_BITS + (node << WITHIN_BITS))).collect();
+        let cells = nodes.windows(2).map(|ends| cubic(&ends[0], &ends[1])).collect();
         Self {
             viscous_nm_s_rad: curves.iter().map(|curve| curve.parameters().viscous_nm_s_rad).sum(),
             offset_nm: curves.iter().map(|curve| curve.parameters().offset_nm).sum(),
             curves,
             cells,
-            lowest_bits,
         }
     }
 
@@ -42,37 +43,75 @@ impl SlidingFriction {
     /// still or already 0.
     #[inline(always)]
     pub(in crate::simulate) fn torque_nm(&self, speed_rad_s: f64, direction: f64) -> f64 {
-        let level = self.level_nm(speed_rad_s.abs());
-        direction * level + (self.viscous_nm_s_rad * speed_rad_s + self.offset_nm)
+        direction * self.level_nm(speed_rad_s) + (self.viscous_nm_s_rad * speed_rad_s + self.offset_nm)
     }
 
+    /// The cubic that serves at a speed of at least 0; none outside of the table.
+    #[inline(always)]
+    fn cell(&self, speed: f64) -> Option<&[f64; 4]> {
+        self.cells.get((speed.to_bits().wrapping_sub(LOWEST_BITS) >> WITHIN_BITS) as usize)
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn exact_level_nm(&self, speed: f64) -> f64 {
+        exact_level_nm(&self.curves, speed)
+    }
+}
+
+impl Level<f64> for SlidingFriction {
     #[inline(always)]
     fn level_nm(&self, speed: f64) -> f64 {
-        let bits = speed.to_bits().wrapping_sub(self.lowest_bits);
-        let Some([a, b, c, d]) = self.cells.get((bits >> WITHIN_BITS) as usize) else {
-            return exact_level_nm(&self.curves, speed);
-        };
-        let share = (bits & ((1 << WITHIN_BITS) - 1)) as f64 * (1.0 / (1_u64 << WITHIN_BITS) as f64);
-        // Two short chains in place of Horner's long one: the next stage of the integrator waits for this.
-        (a + share * b) + share * share * (c + share * d)
+        let speed = speed.abs();
+        match self.cell(speed) {
+            Some(cubic) => level(cubic, within(speed)),
+            None => self.exact_level_nm(speed),
+        }
     }
+}
+
+/// Bits of a speed that name its place within a cell.
+pub(super) const WITHIN_MASK: u64 = (1 << WITHIN_BITS) - 1;
+
+/// How far a speed is above the lower end of its cell, rad/s.
+#[inline(always)]
+fn within(speed: f64) -> f64 {
+    speed - f64::from_bits(speed.to_bits() & !WITHIN_MASK)
+}
+
+/// Value of a cell's cubic.
+#[inline(always)]
+pub(super) fn level<N: Number>([a, c, b, d]: &[N; 4], t: N) -> N {
+    // Two short chains in place of Horner's long one: the next stage of the integrator waits for this.
+    (*a + t * *b) + (t * t) * (*c + t * *d)
 }
 
 fn exact_level_nm(curves: &[Stribeck], speed: f64) -> f64 {
     curves.iter().map(|curve| curve.level_nm(speed)).sum()
 }
 
+/// Speed, rad/s, level, N m, and its slope, N m s/rad, at an end of a cell.
+struct Node {
+    speed: f64,
+    level: f64,
+    slope: f64,
+}
+
+impl Node {
+    fn new(curves: &[Stribeck], bits: u64) -> Self {
+        let speed = f64::from_bits(bits);
+        let slope = |curve: &Stribeck| curve.slope_nm_s_rad(speed) - curve.parameters().viscous_nm_s_rad;
+        Self { speed, level: exact_level_nm(curves, speed), slope: curves.iter().map(slope).sum() }
+    }
+}
+
 /// The cubic with the values and slopes of the level at both ends of a cell (Hermite).
-fn cubic(curves: &[Stribeck], bits: u64) -> [f64; 4] {
-    let [low, high] = [bits, bits + (1 << WITHIN_BITS)].map(f64::from_bits);
-    let value = |speed| exact_level_nm(curves, speed);
-    let slope = |speed: f64| -> f64 {
-        let one = |curve: &Stribeck| curve.slope_nm_s_rad(speed) - curve.parameters().viscous_nm_s_rad;
-        (high - low) * curves.iter().map(one).sum::<f64>()
-    };
-    let rise = value(high) - value(low);
-    let (start, end) = (slope(low), slope(high));
-    [value(low), start, 3.0 * rise - 2.0 * start - end, start + end - 2.0 * rise]
+fn cubic(low: &Node, high: &Node) -> [f64; 4] {
+    let width = high.speed - low.speed;
+    let rise = (high.level - low.level) / width;
+    let square = (3.0 * rise - 2.0 * low.slope - high.slope) / width;
+    let cube = (low.slope + high.slope - 2.0 * rise) / (width * width);
+    [low.level, square, low.slope, cube]
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@ use nalgebra::{Matrix2, Vector2};
 
 use super::*;
 use crate::friction::StribeckParameters;
+use crate::robot::Coefficients;
 
 const ROBOT: RobotParameters = RobotParameters {
     body_mass_kg: 12.6,
@@ -229,4 +230,30 @@ fn a_time_stepping_scheme_agrees_through_stops_and_starts() {
     });
     let difference = largest_difference(&driven_plant(4).0, &other);
     assert!(difference < 1e-5, "{difference}");
+}
+
+#[test]
+fn every_instruction_set_gives_the_same_bytes() {
+    let path = |arch: pulp::Arch| {
+        let mut plant = PlanarPlant::new(&ROBOT, table_4(), &pitched(0.02));
+        driven(|torque_nm| {
+            plant.advance_on(arch, &torque(torque_nm), 1e-3, 10);
+            plant.state()
+        })
+    };
+    assert_eq!(path(pulp::Arch::Scalar), path(pulp::Arch::new()));
+}
+
+/// Far beyond the reach of the series around one angle.
+#[test]
+fn fast_turns_keep_their_energy() {
+    let start = State { pitch_rate_rad_s: 30.0, ..State::default() };
+    let mut plant = PlanarPlant::new(&ROBOT, [None; 2], &start);
+    let energy = ROBOT.energy_j(&plant.state());
+    for _ in 0..3000 {
+        plant.advance(&torque(0.0), 1e-3, 10);
+    }
+    assert!(plant.state().pitch_rad > 30.0);
+    let change = (ROBOT.energy_j(&plant.state()) / energy - 1.0).abs();
+    assert!(change < 1e-6, "{change}");
 }
