@@ -21,7 +21,7 @@ mod statistics;
 pub use actuator::Actuator;
 pub use bench_plant::BenchPlant;
 pub use ground::Ground;
-pub use planar::{Forcing, PlanarPlant};
+pub use planar::{Forcing, PlanarPlant, advance_batch};
 pub use plant::{Plant, Pose};
 pub use response::predicted_response;
 pub use sample::Sample;

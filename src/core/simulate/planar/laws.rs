@@ -38,7 +38,7 @@ pub(super) struct Laws<N = f64> {
 }
 
 /// What acts on the robot during one tick.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Loads<N = f64> {
     /// ΣT before friction, N m.
     pub(super) torque_nm: N,

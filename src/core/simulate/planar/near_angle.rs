@@ -3,7 +3,7 @@
 use super::number::Number;
 
 /// Farthest angle that the series serves, rad; its error there is below 1e-17.
-const REACH_RAD: f64 = 0.02;
+pub(super) const REACH_RAD: f64 = 0.02;
 
 /// An angle with its sine and cosine.
 #[derive(Clone, Copy, Debug)]

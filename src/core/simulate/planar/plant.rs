@@ -40,17 +40,17 @@ pub struct Forcing {
 /// A robot in motion.
 #[derive(Clone, Debug)]
 pub struct PlanarPlant {
-    laws: Laws,
-    sliding: SlidingFriction,
+    pub(super) laws: Laws,
+    pub(super) sliding: SlidingFriction,
     /// Sum of both motors' ranges at rest, N m; none where no torque is needed to turn a resting shaft.
-    stick_range_nm: Option<RangeInclusive<f64>>,
-    motion: Motion,
-    phase: Phase,
-    near: NearAngle,
+    pub(super) stick_range_nm: Option<RangeInclusive<f64>>,
+    pub(super) motion: Motion,
+    pub(super) phase: Phase,
+    pub(super) near: NearAngle,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Phase {
+pub(super) enum Phase {
     /// Friction without a range at rest: one continuous law for all speeds.
     Free,
     /// The shafts turn forward (1) or backward (−1).
@@ -117,18 +117,29 @@ impl PlanarPlant {
 
     /// Newer encodings of the same operations need fewer instructions; the bytes are the same.
     fn advance_on(&mut self, arch: pulp::Arch, forcing: &Forcing, dt_s: f64, substeps: u32) {
-        let loads = Loads {
+        let loads = self.loads(forcing);
+        arch.dispatch(Advance { plant: self, loads, step: dt_s / f64::from(substeps), substeps });
+    }
+
+    pub(super) fn loads(&self, forcing: &Forcing) -> Loads {
+        Loads {
             torque_nm: forcing.torque_nm.iter().sum(),
             along_nm: self.laws.radius_m * forcing.push_n,
             about_nm: forcing.push_height_m * forcing.push_n,
-        };
-        let step = dt_s / f64::from(substeps);
-        arch.dispatch(Advance { plant: self, loads, step, substeps });
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn advance_inline(&mut self, loads: &Loads, step: f64, substeps: u32) {
+        self.begin(loads);
+        for _ in 0..substeps {
+            self.substep(loads, step);
+        }
     }
 
     /// New loads may be more than friction holds.
     #[inline(always)]
-    fn begin(&mut self, loads: &Loads) {
+    pub(super) fn begin(&mut self, loads: &Loads) {
         if self.phase == Phase::Stuck && self.margin(loads, &self.motion) < 0.0 {
             self.leave(loads);
         }
@@ -147,7 +158,7 @@ impl PlanarPlant {
 
     #[cold]
     #[inline(never)]
-    fn substep_with_changes(&mut self, loads: &Loads, step: f64) {
+    pub(super) fn substep_with_changes(&mut self, loads: &Loads, step: f64) {
         let mut left = step;
         for _ in 0..MAX_CHANGES {
             self.begin(loads);
@@ -269,10 +280,7 @@ impl pulp::WithSimd for Advance<'_> {
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
         let Self { plant, loads, step, substeps } = self;
-        plant.begin(&loads);
-        for _ in 0..substeps {
-            plant.substep(&loads, step);
-        }
+        plant.advance_inline(&loads, step, substeps);
     }
 }
 

@@ -9,7 +9,7 @@ use crate::friction::Stribeck;
 const CELL_BITS: u32 = 6;
 /// Lowest tabulated speed, 2⁻³⁰ rad/s, and the number of octaves above it: up to 1024 rad/s.
 const LOWEST_BITS: u64 = (1023 - 30) << (f64::MANTISSA_DIGITS - 1);
-const CELLS: u64 = 40 << CELL_BITS;
+const CELLS: usize = 40 << CELL_BITS;
 /// Bits of a float below a cell's index.
 const WITHIN_BITS: u32 = f64::MANTISSA_DIGITS - 1 - CELL_BITS;
 
@@ -22,20 +22,20 @@ pub(in crate::simulate) struct SlidingFriction {
     /// Cubic of each cell in the speed t above its lower end: factors of 1, t², t, t³, so that those used
     /// alike lie side by side. Cells are spaced as floats are, finer towards zero, where the curve is
     /// steepest.
-    cells: Vec<[f64; 4]>,
+    cells: Box<[[f64; 4]; CELLS]>,
 }
 
 impl SlidingFriction {
     pub(in crate::simulate) fn new(curves: impl IntoIterator<Item = Stribeck>) -> Self {
         let curves: Vec<Stribeck> = curves.into_iter().collect();
         let nodes: Vec<Node> =
-            (0..=CELLS).map(|node| Node::new(&curves, LOWEST_BITS + (node << WITHIN_BITS))).collect();
-        let cells = nodes.windows(2).map(|ends| cubic(&ends[0], &ends[1])).collect();
+            (0..=CELLS as u64).map(|node| Node::new(&curves, LOWEST_BITS + (node << WITHIN_BITS))).collect();
+        let cells: Vec<_> = nodes.windows(2).map(|ends| cubic(&ends[0], &ends[1])).collect();
         Self {
             viscous_nm_s_rad: curves.iter().map(|curve| curve.parameters().viscous_nm_s_rad).sum(),
             offset_nm: curves.iter().map(|curve| curve.parameters().offset_nm).sum(),
             curves,
-            cells,
+            cells: cells.try_into().expect("there is a cell between two nodes"),
         }
     }
 
@@ -50,6 +50,15 @@ impl SlidingFriction {
     #[inline(always)]
     fn cell(&self, speed: f64) -> Option<&[f64; 4]> {
         self.cells.get((speed.to_bits().wrapping_sub(LOWEST_BITS) >> WITHIN_BITS) as usize)
+    }
+
+    /// The same with a constant outside of the table.
+    #[inline(always)]
+    pub(super) fn cell_or_constant(&self, speed: f64) -> [f64; 4] {
+        match self.cell(speed) {
+            Some(cubic) => *cubic,
+            None => [self.exact_level_nm(speed), 0.0, 0.0, 0.0],
+        }
     }
 
     #[cold]
