@@ -2,10 +2,12 @@
 
 use nalgebra::{Matrix2x4, Vector2};
 
+use super::odometry::{Measurement, Odometry};
+use super::yaw::default_yaw_hold;
 use crate::ParameterError;
 use crate::friction::{Compensation, Feedforward};
 use crate::model_file::RobotModel;
-use crate::robot::State;
+use crate::robot::{State, YawHold};
 
 /// Compensation of models that give friction but no `[compensation]`: a little less than the whole curve,
 /// so that a curve that was identified 10 % too high does not drive the robot by itself, and a direction
@@ -21,16 +23,16 @@ pub enum ControllerKind {
     Flqr,
 }
 
-/// What a controller knows at one tick.
+/// X̃ (Eq. 26): where the robot is to be, and which way it is to head.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Measurement {
-    /// X as the robot estimates it from encoders and IMU.
+pub struct Reference {
+    /// State to track.
     pub state: State,
-    /// Motor speeds q̇, left and right, rad/s.
-    pub motor_speed_rad_s: [f64; 2],
+    /// Heading to keep, left positive, rad.
+    pub yaw_rad: f64,
 }
 
-/// State feedback with optional friction feedforward and a torque limit.
+/// State feedback with yaw hold, optional friction feedforward and a torque limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BalanceController {
     /// K, 2×4: rows left and right motor, columns N m/m, N m s/m, N m/rad, N m s/rad.
@@ -40,6 +42,10 @@ pub struct BalanceController {
     pub feedforward: [Option<Feedforward>; 2],
     /// Largest torque of one motor, N m; infinite if unlimited.
     pub torque_limit_nm: f64,
+    /// What keeps the heading.
+    pub yaw_hold: YawHold,
+    /// How the robot makes a measurement of its sensors' readings.
+    pub odometry: Odometry,
 }
 
 /// Why a controller cannot be made from a model.
@@ -67,27 +73,39 @@ pub enum ControlError {
 
 impl BalanceController {
     /// The controller of `kind` for a robot with the given gain; friction, compensation (or
-    /// [`DEFAULT_COMPENSATION`]) and torque limit come from the model.
+    /// [`DEFAULT_COMPENSATION`]), yaw hold (or [`default_yaw_hold`]) and torque limit come from the model.
     pub fn new(kind: ControllerKind, robot: &RobotModel, gain: Matrix2x4<f64>) -> Result<Self, ControlError> {
         check_gain(&gain)?;
         let feedforward = match kind {
             ControllerKind::Lqr => [None; 2],
             ControllerKind::Flqr => feedforward(robot)?,
         };
-        Ok(Self { gain, feedforward, torque_limit_nm: robot.limits.torque_nm.unwrap_or(f64::INFINITY) })
+        Ok(Self {
+            gain,
+            feedforward,
+            torque_limit_nm: robot.limits.torque_nm.unwrap_or(f64::INFINITY),
+            yaw_hold: robot.yaw_hold.unwrap_or_else(|| default_yaw_hold(&robot.parameters, &robot.chassis)),
+            odometry: Odometry::new(robot),
+        })
     }
 
-    /// Torques of the left and the right motor, N m: −K X (Eq. 13) plus the feedforward at each motor's
-    /// speed (Eq. 29), within the limit; 0 where a measurement is not a number, so that a sensor that failed
-    /// cannot drive the robot.
-    pub fn step(&self, measurement: &Measurement) -> [f64; 2] {
-        let feedback: Vector2<f64> = -(self.gain * measurement.state.to_vector());
+    /// Torques of the left and the right motor, N m: K (X̃ − X) (Eq. 26) plus the yaw hold, in equal and
+    /// opposite shares, plus the feedforward at each motor's speed (Eq. 29), within the limit; 0 where a
+    /// measurement is not a number, so that a sensor that failed cannot drive the robot.
+    ///
+    /// The yaw hold follows the difference of the wheels alone, so that it is the same at any speed, and the
+    /// balance their mean alone, so that neither disturbs the other.
+    pub fn step(&self, measurement: &Measurement, reference: &Reference) -> [f64; 2] {
+        let error = reference.state.to_vector() - measurement.state.to_vector();
+        let feedback: Vector2<f64> = self.gain * error;
+        let turning = self.yaw_hold.stiffness_nm_rad * (reference.yaw_rad - measurement.yaw_rad)
+            - self.yaw_hold.damping_nm_s_rad * measurement.yaw_rate_rad_s;
         // A limit below zero or not a number switches the motors off.
         let limit = self.torque_limit_nm.max(0.0);
         std::array::from_fn(|motor| {
             let friction = self.feedforward[motor]
                 .map_or(0.0, |feedforward| feedforward.torque_nm(measurement.motor_speed_rad_s[motor]));
-            let torque = feedback[motor] + friction;
+            let torque = feedback[motor] + [-turning, turning][motor] + friction;
             if torque.is_finite() { torque.clamp(-limit, limit) } else { 0.0 }
         })
     }

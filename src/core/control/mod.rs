@@ -1,11 +1,20 @@
 //! Controllers: one pure step from measurements to motor torques.
 //!
-//! LQR is u = −K X (Eq. 13); FLQR adds each motor's friction at its measured speed (Eq. 29). Torques are
-//! those of the two motor shafts, left then right, N m, and drive the robot forward when positive.
+//! LQR is u = K (X̃ − X) (Eqs. 13, 26); FLQR adds each motor's friction at its measured speed (Eq. 29). Both
+//! hold the heading. Torques are those of the two motor shafts, left then right, N m, and drive the robot
+//! forward when positive. A single motor on a bench is held at a speed by PI.
 
 mod balance;
+mod odometry;
+mod schedule;
+mod speed;
+mod yaw;
 
-pub use balance::{BalanceController, ControlError, ControllerKind, DEFAULT_COMPENSATION, Measurement};
+pub use balance::{BalanceController, ControlError, ControllerKind, DEFAULT_COMPENSATION, Reference};
+pub use odometry::{Measurement, Odometry, Readings};
+pub use schedule::{GainSchedule, ScheduleError, ScheduleNode};
+pub use speed::{SpeedPi, SpeedPiState};
+pub use yaw::default_yaw_hold;
 
 #[cfg(test)]
 mod tests;

@@ -161,7 +161,10 @@ impl Analysis {
         );
         let half_rate = 0.5 * system.imu_rate_rad_s();
         let alternates = up.is_some_and(|crossing| crossing.frequency_rad_s >= ALTERNATING * half_rate);
-        let borne = |crossing: &Crossing| !alternates || self.is_stable(0.5 * crossing.value);
+        let longest_s = LONGEST_QUEUE * self.timing.tick_s;
+        let borne = |crossing: &Crossing| {
+            !alternates || (crossing.value <= longest_s && self.is_stable(0.5 * crossing.value))
+        };
         let delay = delay.filter(borne).or_else(|| self.delay_by_bisection());
         let value = |found: Option<Crossing>, none: f64| found.map_or(none, |crossing| crossing.value);
         let frequency = |found: Option<Crossing>| found.map_or(0.0, |crossing| crossing.frequency_rad_s);

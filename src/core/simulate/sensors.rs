@@ -115,7 +115,10 @@ impl Sensors {
             pitch_rad: self.pitch_rad,
             pitch_rate_rad_s: self.pitch_rate_rad_s,
         };
-        Readings { motor_angle_rad, measurement: Measurement { state, motor_speed_rad_s } }
+        Readings {
+            motor_angle_rad,
+            measurement: Measurement { state, motor_speed_rad_s, ..Measurement::default() },
+        }
     }
 
     fn sample_imu(&mut self, state: &State) {

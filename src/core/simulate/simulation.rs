@@ -7,7 +7,7 @@ use super::planar::{Forcing, PlanarPlant};
 use super::sample::Sample;
 use super::sensors::{SensorSettings, Sensors};
 use crate::ParameterError;
-use crate::control::BalanceController;
+use crate::control::{BalanceController, Reference};
 use crate::model_file::RobotModel;
 use crate::parameter::{finite, not_negative, within};
 use crate::robot::State;
@@ -118,7 +118,11 @@ impl Simulation {
     /// does the clock.
     pub fn step(&mut self) -> Sample {
         let readings = self.sensors.read(&self.plant, self.tick);
-        let asked = if self.fall.is_some() { [0.0; 2] } else { self.controller.step(&readings.measurement) };
+        let asked = if self.fall.is_some() {
+            [0.0; 2]
+        } else {
+            self.controller.step(&readings.measurement, &Reference::default())
+        };
         let state = readings.measurement.state;
         let sample = Sample {
             time_s: self.time_s(),
