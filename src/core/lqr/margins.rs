@@ -57,6 +57,8 @@ const PER_DECADE: f64 = 24.0;
 const FOLDING: f64 = 0.1;
 /// Share of half the IMU's rate from which on a loop counts as one that alternates.
 const ALTERNATING: f64 = 0.9;
+/// Factor up to which it is next to doing so, and frequencies may miss a delay that makes it.
+const NEAR: f64 = 4.0;
 /// Crossings of a kind that are refined, nearest first.
 const REFINED: usize = 3;
 const NEWTON_STEPS: usize = 12;
@@ -160,12 +162,11 @@ impl Analysis {
             },
         );
         let half_rate = 0.5 * system.imu_rate_rad_s();
-        let alternates = up.is_some_and(|crossing| crossing.frequency_rad_s >= ALTERNATING * half_rate);
+        let alternates =
+            up.is_some_and(|up| up.value < NEAR && up.frequency_rad_s >= ALTERNATING * half_rate);
         let longest_s = LONGEST_QUEUE * self.timing.tick_s;
-        let borne = |crossing: &Crossing| {
-            !alternates || (crossing.value <= longest_s && self.is_stable(0.5 * crossing.value))
-        };
-        let delay = delay.filter(borne).or_else(|| self.delay_by_bisection());
+        let borne = |extra: &Crossing| !alternates || self.is_stable(longest_s.min(0.5 * extra.value));
+        let delay = delay.filter(borne).or_else(|| self.delay_by_bisection()).or(delay);
         let value = |found: Option<Crossing>, none: f64| found.map_or(none, |crossing| crossing.value);
         let frequency = |found: Option<Crossing>| found.map_or(0.0, |crossing| crossing.frequency_rad_s);
         Margins {
@@ -184,7 +185,7 @@ impl Analysis {
         self.system(extra_delay_s).spectral_radius(1.0).is_some_and(|radius| radius < 1.0)
     }
 
-    /// For loops next to alternating from one IMU sample to the next, where frequencies say little.
+    /// For loops next to alternating from one IMU sample to the next, whose hold hides crossings from the search.
     fn delay_by_bisection(&self) -> Option<Crossing> {
         let (mut low, mut high) = (0.0, self.timing.tick_s / 16.0);
         while self.is_stable(high) {

@@ -173,6 +173,7 @@ fn loops_are_stable_between_their_gain_margins_and_not_beyond() {
             let factor = (found.gain_down * 1.001).powf(1.0 - share) * (highest * 0.999).powf(share);
             assert!(radius_beyond(factor) < 1.0, "{about} at {factor}");
         }
+        assert!(found.delay_s.is_finite(), "{about}");
         let later = |extra: f64| SampledLoop { delay_s: timing.delay_s + extra, ..timing };
         for share in [0.2, 0.5, 0.8, 0.999] {
             assert!(subject.radius(&later(share * found.delay_s), 1.0) < 1.0, "{about} at {share}");
