@@ -92,7 +92,7 @@ fn block(block: &Block, counters: &mut Counters, markup: &mut Markup) {
         }
         Block::Heading { text, .. } => markup.text_element("h3", &[], text),
         Block::Paragraph(text) => markup.text_element("p", &[], text),
-        Block::Notice { tone, text } => notice(*tone, text, markup),
+        Block::Notice { tone, label, text } => notice(*tone, label, text, markup),
         Block::List { numbered, items } => {
             markup.element(if *numbered { "ol" } else { "ul" }, &[], |markup| {
                 items.iter().for_each(|item| markup.text_element("li", &[], item));
@@ -106,14 +106,14 @@ fn block(block: &Block, counters: &mut Counters, markup: &mut Markup) {
     }
 }
 
-fn notice(tone: Tone, text: &str, markup: &mut Markup) {
+fn notice(tone: Tone, label: &str, text: &str, markup: &mut Markup) {
     let class = match tone {
         Tone::Note => "notice",
-        Tone::Holds => "notice holds",
+        Tone::Good => "notice good",
         Tone::Warning => "notice warning",
     };
     markup.element("p", &[("class", &class)], |markup| {
-        markup.text_element("strong", &[], &format!("{}:", tone.word()));
+        markup.text_element("strong", &[], &format!("{label}:"));
         markup.text(" ");
         markup.text(text);
     });

@@ -49,6 +49,8 @@ pub enum Block {
     Notice {
         /// How it is meant.
         tone: Tone,
+        /// What it begins with, in bold: the meaning must not hang on the tone's colour alone.
+        label: String,
         /// Its words.
         text: String,
     },
@@ -70,21 +72,10 @@ pub enum Block {
 pub enum Tone {
     /// Good to know.
     Note,
-    /// Something holds that had to be shown.
-    Holds,
+    /// Something holds, or is as it should be.
+    Good,
     /// Something does not hold, or is not to be relied on.
     Warning,
-}
-
-impl Tone {
-    /// The word in front, so that no meaning hangs on a colour alone.
-    pub(self) fn word(self) -> &'static str {
-        match self {
-            Self::Note => "Note",
-            Self::Holds => "Holds",
-            Self::Warning => "Does not hold",
-        }
-    }
 }
 
 impl Block {
@@ -104,8 +95,8 @@ impl Block {
     }
 
     /// A paragraph that stands out.
-    pub fn notice(tone: Tone, text: impl Into<String>) -> Self {
-        Self::Notice { tone, text: text.into() }
+    pub fn notice(tone: Tone, label: impl Into<String>, text: impl Into<String>) -> Self {
+        Self::Notice { tone, label: label.into(), text: text.into() }
     }
 }
 

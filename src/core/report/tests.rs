@@ -128,7 +128,7 @@ fn sample(words: &str) -> Document {
             Block::section(words),
             Block::part(words),
             Block::paragraph(words),
-            Block::notice(Tone::Warning, words),
+            Block::notice(Tone::Warning, words, words),
             Block::section("second"),
             Block::List { numbered: true, items: vec![words.to_owned(); 2] },
             Block::section("third"),

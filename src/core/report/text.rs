@@ -45,7 +45,7 @@ fn block(block: &Block) -> String {
         Block::Heading { level: 1, text } => format!("\n{}", underlined(text, '-')),
         Block::Heading { text, .. } => format!("{}\n", one_line(text)),
         Block::Paragraph(text) => paragraph(text),
-        Block::Notice { tone, text } => paragraph(&format!("{}: {text}", tone.word())),
+        Block::Notice { label, text, .. } => paragraph(&format!("{label}: {text}")),
         Block::List { numbered, items } => list(*numbered, items),
         Block::Table(table) => self::table(table),
         Block::Figure(chart) => figure(chart),
