@@ -1,6 +1,7 @@
 //! The command line: one file for each command, all over the same core functions as the window.
 
 mod export;
+mod file;
 mod fit;
 mod gains;
 mod input;

@@ -1,7 +1,5 @@
 //! `flqr simulate`: the simulated robot in a scenario.
 
-use std::fs::{self, File};
-use std::io::{self, BufWriter, Write};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
@@ -13,7 +11,7 @@ use serde::Serialize;
 
 use super::output::{Failure, Output, complain};
 use super::progress::Progress;
-use super::{gains, input};
+use super::{file, gains, input};
 
 #[derive(Args)]
 pub(crate) struct Arguments {
@@ -97,34 +95,7 @@ fn write_log(path: &Path, samples: &[Sample]) -> Result<(), Failure> {
         .enumerate()
         .map(|(index, name)| (*name, rows.iter().map(|row| row[index]).collect::<Vec<_>>()));
     let log = Log::from_columns(path.display().to_string(), columns);
-    replace(path, |file| record::write_log(&log, file)).map_err(|error| {
-        Failure::Message(format!(
-            "{}: cannot write the log: {error}: check the folder, its permissions and the space on the disk",
-            path.display()
-        ))
-    })
-}
-
-/// Writes by way of a second file, so that a failure leaves what was there. Devices and pipes, which a
-/// rename would replace, are written to directly.
-fn replace(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
-    let fill = |target: &Path| {
-        let mut file = BufWriter::new(File::create(target)?);
-        write(&mut file)?;
-        file.flush()
-    };
-    if path.metadata().is_ok_and(|about| !about.is_file()) {
-        return fill(path);
-    }
-    let mut beside = path.as_os_str().to_owned();
-    beside.push(format!(".{}.new", std::process::id()));
-    let beside = Path::new(&beside);
-    let done = fill(beside).and_then(|()| fs::rename(beside, path));
-    if done.is_err() {
-        // There may be no such file; the error that matters is the first one.
-        fs::remove_file(beside).unwrap_or(());
-    }
-    done
+    file::write(path, "log", |out| record::write_log(&log, out))
 }
 
 fn report(output: &Output, name: &str, run: &Run) -> Result<(), Failure> {
