@@ -302,6 +302,11 @@ impl Laws {
         (away.abs() - tether.slack_m).max(0.0).copysign(away)
     }
 
+    /// Sine and cosine of the path's slope against the plane.
+    pub(super) fn tilt(&self, at: &Motion) -> (f64, f64) {
+        self.terrain.as_ref().map_or((0.0, 1.0), |terrain| terrain.tilt(self.distances(at)))
+    }
+
     /// Kinetic and potential energy, J: 0 when upright at rest on level ground at height 0 without payload.
     pub(super) fn energy_j(&self, at: &Motion) -> f64 {
         let lean = libm::sincos(at.lean);
@@ -313,7 +318,7 @@ impl Laws {
         let stretch = |tether: &Tether| self.stretch(tether, at, self.body_axis(lean));
         let tether =
             self.tether.as_ref().map_or(0.0, |tether| 0.5 * tether.stiffness_n_m * stretch(tether).powi(2));
-        let (tilt_sin, tilt_cos) = self.terrain.as_ref().map_or((0.0, 1.0), |terrain| terrain.tilt(&place));
+        let (tilt_sin, tilt_cos) = self.tilt(at);
         let (sin, cos) = (lean.0 * tilt_cos + lean.1 * tilt_sin, lean.1 * tilt_cos - lean.0 * tilt_sin);
         let (forward, yaw_rate) = self.forward_and_yaw(at);
         let rate = at.lean_rate;

@@ -2,14 +2,29 @@
 //!
 //! # Dynamics
 //! The wheels roll without slip, neither along nor across: the axle's middle moves at v along the heading,
-//! the body leans by θ and turns at ψ̇. With the notation of [`crate::robot`], b the track, J_ψ the body
-//! about the vertical and A = M + 2m + 2I/r², D = J + M l² (Kane's equations; the accelerations of the
-//! centre of mass are those of a point at l from a frame that turns at ψ̇):
-//! - A v̇ + M l cos θ θ̈ = M l sin θ (θ̇² + ψ̇²) + ΣT/r + F
-//! - M l cos θ v̇ + D θ̈ = M g l sin θ + M l² sin θ cos θ ψ̇² − ΣT + h cos θ F
-//! - (J_ψ + M l² sin² θ + 2 (m + I/r²) (b/2)² + I) ψ̈ = −M l sin θ (v + 2 l cos θ θ̇) ψ̇ + (b/2r)(T_r − T_l)
+//! the body pitches at θ̇ and turns at ψ̇. With the notation of [`crate::robot`], b the track, J_ψ the body
+//! about the vertical, γ the slope of the path, β = θ + γ, A = M + 2m + 2I/r² and D = J + M l²:
+//! - A v̇ + M l cos β θ̈ = M l sin β (θ̇² + ψ̇²) + ΣT/r + Q_v
+//! - M l cos β v̇ + D θ̈ = M l sin β (l cos β ψ̇² + v γ̇) − ΣT + Q_θ
+//! - (J_ψ + M l² sin² β + 2 (m + I/r²) (b/2)² + I) ψ̈
+//!   = −M l sin β (v + l cos β (2 θ̇ + γ̇)) ψ̇ + (b/2r) (T_r − T_l) + Q_ψ
 //!
-//! Without yaw the first two are Eqs. 5 and 4. T is the torque after friction.
+//! These are Kane's equations with v, θ̇ and ψ̇ as speeds: the centre of mass at l (sin β, 0, cos β) in a
+//! frame that moves at v and turns at ψ̇ about the path's normal and −γ̇ about the axle. T is the torque
+//! after friction; Q are the other forces, those of gravity and tether being derivatives of a potential.
+//! On level ground Q_θ = M g l sin θ, and without yaw the first two lines are Eqs. 5 and 4.
+//!
+//! # Effects
+//! - Gravity on the slope of the surroundings, a plane: ahead and across change places as the robot turns.
+//! - A ground of its own under each wheel: what each wheel climbs brakes that wheel, their difference turns
+//!   the robot and rolls it by asin((z_r − z_l)/b), which takes cos(roll) of the weight's moment and shifts
+//!   weight to the lower wheel; the path's curvature.
+//! - A push on the body along the path, a tether, a payload, which moves the centre of mass.
+//!
+//! Neglected: slip of the tyres, their springiness and the turning torque of their contact patches; wheels
+//! that leave the ground; the inertia of rolling; forces of the air; motion of the legs; the difference
+//! between the body's inertias about its upright and its fore-and-aft axis. On uneven ground the axle's
+//! middle is taken to move at the mean of both speeds up the mean of both slopes.
 //!
 //! # Method
 //! The coordinates are both motor angles and the pitch, because friction acts along the motor angles: a
@@ -19,10 +34,6 @@
 //! phase, of which each shaft has its own, the motion is smooth and a Runge-Kutta step of order 4 serves;
 //! the instant of a change is located inside the step, and the phases that follow are the one combination
 //! that is consistent with both ranges.
-//!
-//! # Neglected
-//! Slip of the tyres, their springiness and the turning torque of their contact patches; motion of the
-//! legs; the difference between the body's inertias about its own long and fore-and-aft axes.
 
 mod body;
 mod laws;
@@ -162,7 +173,7 @@ impl Plant {
     fn worst_margin(&self, loads: &Loads, motion: &Motion) -> f64 {
         let [left, right] = self.margins(loads, motion);
         // Unlike min(), keeps a margin that is not a number.
-        if left < right { left } else { right }
+        if left < right || left.is_nan() { left } else { right }
     }
 
     /// Ends the sliding of shafts that have come to rest or beyond.

@@ -109,8 +109,8 @@ impl Terrain {
     }
 
     /// Sine and cosine of the path's slope, mean of both wheels.
-    pub(super) fn tilt(&self, place: &Place) -> (f64, f64) {
-        let slope = |i: usize| self.paths[i].under(place.distance[i], 0).slope;
+    pub(super) fn tilt(&self, distance: [f64; 2]) -> (f64, f64) {
+        let slope = |i: usize| self.paths[i].under(distance[i], 0).slope;
         let sin = 0.5 * (slope(0) + slope(1));
         (sin, (1.0 - sin * sin).sqrt())
     }
