@@ -5,14 +5,14 @@ const TOLERANCE: f64 = 1e-9;
 
 /// Share of a step at which `margin_at` has just fallen below 0, for a margin of at least 0 at share 0 and
 /// below 0 at share 1: by secants, with a bisection after each that was slow. A margin that is not a
-/// number ends the search.
+/// number counts as below 0.
 pub(super) fn first_below_zero(start: f64, end: f64, margin_at: impl Fn(f64) -> f64) -> f64 {
     let mut holds = (0.0, start);
     let mut ended = (1.0, end);
     let mut bisect = false;
     while ended.0 - holds.0 > TOLERANCE {
         let width = ended.0 - holds.0;
-        let share = if bisect {
+        let share = if bisect || !ended.1.is_finite() {
             holds.0 + 0.5 * width
         } else {
             // A little beyond the secant, so that both ends close in.
@@ -49,8 +49,11 @@ mod tests {
     }
 
     #[test]
-    fn margin_that_is_not_a_number_ends_the_search() {
-        assert!(first_below_zero(1.0, -1.0, |_| f64::NAN) <= 1.0);
-        assert!(first_below_zero(1.0, f64::NEG_INFINITY, |_| f64::NEG_INFINITY) <= 1.0);
+    fn margin_that_is_not_finite_ends_the_search_as_well() {
+        for broken in [f64::NAN, f64::NEG_INFINITY] {
+            let margin = |t: f64| if t < 0.4 { 1.0 - t } else { broken };
+            let found = first_below_zero(1.0, broken, margin);
+            assert!((found - 0.4).abs() < 1.1e-9, "{found}");
+        }
     }
 }
