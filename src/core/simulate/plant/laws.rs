@@ -25,6 +25,7 @@ pub(super) struct Laws {
     determinant: f64,
     /// M l, kg m.
     first_moment: f64,
+    first_moment_squared: f64,
     /// M l², kg m².
     second_moment: f64,
     /// Inertia about the vertical when upright, kg m².
@@ -140,6 +141,7 @@ impl Laws {
             // Without the cancellation of the two products.
             determinant: 2.0 * one_wheel * pitching + body.mass_kg * body.pitch_inertia_kg_m2,
             first_moment,
+            first_moment_squared: first_moment * first_moment,
             second_moment,
             // Each wheel about its diameter: half of its spin, as of a disc.
             yawing: body.yaw_inertia_kg_m2 + 2.0 * one_wheel * half_track * half_track + spin,
@@ -190,7 +192,8 @@ impl Laws {
             push_n: forcing.push_n,
             push_height_m: forcing.push_height_m,
             lean: NearAngle::new(at.lean),
-            yaw: NearAngle::new(self.yaw(at)),
+            // Heading matters on a slope only.
+            yaw: NearAngle::new(if self.is_sloped() { self.yaw(at) } else { 0.0 }),
             pieces: self.terrain.as_ref().map_or([0; 2], |terrain| terrain.pieces_at(self.distances(at))),
         }
     }
@@ -231,9 +234,18 @@ impl Laws {
         Place { distance: self.distances(at), wheel_speed: self.wheel_speeds(at), lean, yaw }
     }
 
+    fn is_sloped(&self) -> bool {
+        self.terrain.as_ref().is_some_and(|terrain| !terrain.is_level())
+    }
+
+    /// Whether the ground is one level plane.
+    pub(super) fn is_even(&self) -> bool {
+        self.terrain.is_none()
+    }
+
     #[inline(always)]
-    fn footing(&self, loads: &Loads, at: &Motion, lean: (f64, f64)) -> (Footing, f64) {
-        let Some(terrain) = &self.terrain else {
+    fn footing<const UNEVEN: bool>(&self, loads: &Loads, at: &Motion, lean: (f64, f64)) -> (Footing, f64) {
+        let Some(terrain) = self.terrain.as_ref().filter(|_| UNEVEN) else {
             let about = self.weight_nm * lean.0;
             return (Footing { tilt: (0.0, 1.0), tilt_rate: 0.0, along: 0.0, about, turning: 0.0 }, 0.0);
         };
@@ -242,11 +254,12 @@ impl Laws {
         (terrain.footing(&self.place(at, lean, yaw), loads.pieces), forward * yaw.1)
     }
 
+    /// Accelerations where the robot is; on level ground the ground need not be asked (not `UNEVEN`).
     #[inline(always)]
-    pub(super) fn response(&self, loads: &Loads, at: &Motion) -> Response {
+    pub(super) fn response<const UNEVEN: bool>(&self, loads: &Loads, at: &Motion) -> Response {
         let lean = loads.lean.sin_cos(at.lean);
         let (forward, yaw_rate) = self.forward_and_yaw(at);
-        let (footing, uphill) = self.footing(loads, at, lean);
+        let (footing, uphill) = self.footing::<UNEVEN>(loads, at, lean);
         // Against the path, which the ground may tilt.
         let (sin, cos) = (
             lean.0 * footing.tilt.1 + lean.1 * footing.tilt.0,
@@ -266,8 +279,7 @@ impl Laws {
             footing.turning - (moment_sin * forward + swing * (2.0 * rate + footing.tilt_rate)) * yaw_rate;
 
         // A v̇ + C θ̈ = along, C v̇ + D θ̈ = about; A D − C² without its cancellation when upright
-        let inverse =
-            1.0 / (self.determinant + self.first_moment * self.first_moment * (1.0 - cos) * (1.0 + cos));
+        let inverse = 1.0 / (self.determinant + self.first_moment_squared * (sin * sin));
         let yaw_inverse = 1.0 / (self.yawing + self.second_moment * sin * sin);
         let forward_accel = (self.pitching * along - moment_cos * about) * inverse;
         let lean = (self.translating * about - moment_cos * along) * inverse;

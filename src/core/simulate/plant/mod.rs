@@ -47,8 +47,8 @@ use super::planar::Forcing;
 use crate::model_file::RobotModel;
 use crate::robot::State;
 use laws::{Laws, Loads};
-use motion::{Motion, runge_kutta};
-use shafts::{Phase, Phases, Shaft, margins, settled, shaft_torques};
+use motion::{Motion, Smooth, runge_kutta};
+use shafts::{Phase, Phases, Shaft, margins, settled, shaft_torques, turning_torques};
 
 /// Changes of phase within one substep after which resting shafts are taken as stuck for the rest of it.
 const MAX_CHANGES: usize = 8;
@@ -101,9 +101,7 @@ impl Plant {
         let step = dt_s / f64::from(substeps);
         // Held shafts have been checked at the end of each substep, but under the loads of that call.
         self.release(&loads);
-        for _ in 0..substeps {
-            self.substep(&loads, step);
-        }
+        pulp::Arch::new().dispatch(Advance { plant: self, loads, step, substeps });
     }
 
     /// The true state.
@@ -141,35 +139,55 @@ impl Plant {
         self.motion.is_finite()
     }
 
-    fn substep(&mut self, loads: &Loads, step: f64) {
+    #[inline(always)]
+    fn substeps<const UNEVEN: bool>(&mut self, loads: &Loads, step: f64, substeps: u32) {
+        for _ in 0..substeps {
+            let next = if self.phases.contains(&Phase::Stuck) {
+                self.step(loads, step)
+            } else {
+                runge_kutta(&self.motion, step, &Turning::<UNEVEN> { plant: self, loads })
+            };
+            let end = self.worst_margin(loads, &next);
+            if ended(end) {
+                self.change(loads, step, end);
+            } else {
+                self.motion = next;
+            }
+        }
+    }
+
+    /// A step in which phases end, the first with a margin of `end`.
+    #[cold]
+    #[inline(never)]
+    fn change(&mut self, loads: &Loads, step: f64, mut end: f64) {
         let mut left = step;
         for _ in 0..MAX_CHANGES {
-            let next = self.step(loads, left);
-            let end = self.worst_margin(loads, &next);
-            // A margin that is not a number is not below 0: such a motion is past all phases.
-            if end >= 0.0 || end.is_nan() {
-                self.motion = next;
-                return;
-            }
             let start = self.worst_margin(loads, &self.motion).max(0.0);
-            let share = first_below_zero(start, end, |share| {
-                self.worst_margin(loads, &self.step(loads, left * share))
-            });
+            let margin_at = |share| self.worst_margin(loads, &self.step(loads, left * share));
+            let share = first_below_zero(start, end, margin_at);
             self.motion = self.step(loads, left * share);
             left *= 1.0 - share;
             self.stop(loads);
             self.release(loads);
+            let next = self.step(loads, left);
+            end = self.worst_margin(loads, &next);
+            if !ended(end) {
+                self.motion = next;
+                return;
+            }
         }
         self.rest();
         self.motion = self.step(loads, left);
         self.stop(loads);
     }
 
+    #[inline(always)]
     fn margins(&self, loads: &Loads, motion: &Motion) -> [f64; 2] {
-        let response = || self.laws.response(loads, motion);
+        let response = || self.laws.response::<true>(loads, motion);
         margins(&self.shafts, self.phases, loads.torque_nm, motion.speed, response)
     }
 
+    #[inline(always)]
     fn worst_margin(&self, loads: &Loads, motion: &Motion) -> f64 {
         let [left, right] = self.margins(loads, motion);
         // Unlike min(), keeps a margin that is not a number.
@@ -197,7 +215,7 @@ impl Plant {
             // Nothing holds what is not a number; it shows in the speed.
             self.phases = [Phase::Free; 2];
         } else if margin < 0.0 {
-            let response = self.laws.response(loads, &self.motion);
+            let response = self.laws.response::<true>(loads, &self.motion);
             self.phases = settled(&self.shafts, self.phases, loads.torque_nm, self.motion.speed, &response);
         }
     }
@@ -211,27 +229,74 @@ impl Plant {
         }
     }
 
+    /// The next motion in the present phases, whichever they are.
     fn step(&self, loads: &Loads, dt: f64) -> Motion {
-        runge_kutta(&self.motion, dt, |at| self.rate(loads, at))
+        runge_kutta(&self.motion, dt, &InPhases { plant: self, loads })
     }
+}
 
-    #[inline(always)]
-    fn rate(&self, loads: &Loads, at: &Motion) -> Motion {
-        let response = self.laws.response(loads, at);
-        let shaft_nm = shaft_torques(&self.shafts, self.phases, loads.torque_nm, at.speed, &response);
-        let mut acceleration = response.motor_accelerations(shaft_nm);
-        for (acceleration, phase) in acceleration.iter_mut().zip(self.phases) {
+/// Motion in the present phases, whichever they are.
+struct InPhases<'a> {
+    plant: &'a Plant,
+    loads: &'a Loads,
+}
+
+impl Smooth for InPhases<'_> {
+    fn rate(&self, at: &Motion) -> Motion {
+        let Self { plant, loads } = *self;
+        let response = plant.laws.response::<true>(loads, at);
+        let shaft_nm = shaft_torques(&plant.shafts, plant.phases, loads.torque_nm, at.speed, &response);
+        let mut rate = at.rate(&response, shaft_nm);
+        for (acceleration, phase) in rate.speed.iter_mut().zip(plant.phases) {
             // Exactly, not only up to rounding, so that the angle keeps its last bit.
             if phase == Phase::Stuck {
                 *acceleration = 0.0;
             }
         }
-        Motion {
-            angle: at.speed,
-            speed: acceleration,
-            lean: at.lean_rate,
-            lean_rate: response.lean_acceleration(shaft_nm),
-            uphill: response.uphill,
+        rate
+    }
+}
+
+/// The same where no shaft is held, and on level ground unless `UNEVEN`.
+struct Turning<'a, const UNEVEN: bool> {
+    plant: &'a Plant,
+    loads: &'a Loads,
+}
+
+impl<const UNEVEN: bool> Smooth for Turning<'_, UNEVEN> {
+    #[inline(always)]
+    fn rate(&self, at: &Motion) -> Motion {
+        let Self { plant, loads } = *self;
+        let response = plant.laws.response::<UNEVEN>(loads, at);
+        at.rate(&response, turning_torques(&plant.shafts, plant.phases, loads.torque_nm, at.speed))
+    }
+}
+
+/// Whether a margin says that a phase has ended. One that is not a number does not: such a motion is past all
+/// phases.
+fn ended(margin: f64) -> bool {
+    margin < 0.0
+}
+
+/// The substeps of one call, compiled for each instruction set: newer encodings of the same operations need
+/// fewer instructions; the bytes are the same.
+struct Advance<'a> {
+    plant: &'a mut Plant,
+    loads: Loads,
+    step: f64,
+    substeps: u32,
+}
+
+impl pulp::WithSimd for Advance<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let Self { plant, loads, step, substeps } = self;
+        if plant.laws.is_even() {
+            plant.substeps::<false>(&loads, step, substeps);
+        } else {
+            plant.substeps::<true>(&loads, step, substeps);
         }
     }
 }

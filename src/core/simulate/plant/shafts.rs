@@ -63,7 +63,6 @@ impl Shaft {
 
 /// Torques on both shafts after friction, N m: the motors' less friction where a shaft turns, and what
 /// keeps q̈ = 0 where it is held.
-#[inline(always)]
 pub(super) fn shaft_torques(
     shafts: &[Shaft; 2],
     phases: Phases,
@@ -71,23 +70,29 @@ pub(super) fn shaft_torques(
     speed: [f64; 2],
     response: &Response,
 ) -> [f64; 2] {
-    let turning = |i: usize| torque_nm[i] - shafts[i].friction_nm(phases[i], speed[i]);
+    let turning = turning_torques(shafts, phases, torque_nm, speed);
     match (phases[0] == Phase::Stuck, phases[1] == Phase::Stuck) {
-        (false, false) => [turning(0), turning(1)],
+        (false, false) => turning,
         (true, true) => response.holding_both(),
-        (true, false) => {
-            let other = turning(1);
-            [response.holding_one(0, other), other]
-        }
-        (false, true) => {
-            let other = turning(0);
-            [other, response.holding_one(1, other)]
-        }
+        (true, false) => [response.holding_one(0, turning[1]), turning[1]],
+        (false, true) => [turning[0], response.holding_one(1, turning[0])],
     }
+}
+
+/// The same where both shafts turn.
+#[inline(always)]
+pub(super) fn turning_torques(
+    shafts: &[Shaft; 2],
+    phases: Phases,
+    torque_nm: [f64; 2],
+    speed: [f64; 2],
+) -> [f64; 2] {
+    [0, 1].map(|i: usize| torque_nm[i] - shafts[i].friction_nm(phases[i], speed[i]))
 }
 
 /// At least 0 for each shaft whose phase goes on: the speed in the direction of sliding, rad/s, or the
 /// reserve of the holding friction, N m.
+#[inline(always)]
 pub(super) fn margins(
     shafts: &[Shaft; 2],
     phases: Phases,

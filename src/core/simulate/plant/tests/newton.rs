@@ -124,7 +124,7 @@ fn accelerations_are_newtons_and_eulers() {
 
             let loads =
                 plant.laws.loads(&Forcing { push_n, push_height_m, ..torque(0.0, 0.0) }, &plant.motion);
-            let response = plant.laws.response(&loads, &plant.motion);
+            let response = plant.laws.response::<true>(&loads, &plant.motion);
             let motors = response.motor_accelerations(shaft_nm);
             let expected = of_motors(&accel);
             let errors = [
