@@ -6,6 +6,8 @@
 //!   polishes to the optimum, and profile likelihood gives the intervals.
 //! - Any other motion of one axis gives inertia or mass and friction ([`motion`]).
 //!
+//! [`excitation`] has the motions that such logs are recorded with.
+//!
 //! | symbol of the paper | here |
 //! |---|---|
 //! | q̇̄, τ̄_f | [`FrictionPair`] |
@@ -15,6 +17,7 @@
 //! | K (section 3.1) | edge samples, a tenth of a dwell |
 
 mod error;
+pub mod excitation;
 mod exp2;
 pub mod filter;
 mod fit;
