@@ -1,58 +1,128 @@
 //! `flqr simulate`: the simulated robot in a scenario.
 
+use std::io::{self, Write};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
-use clap::{Args, ValueEnum};
-use flqr_core::control::{BalanceController, ControllerKind};
-use flqr_core::record::{self, Log};
-use flqr_core::simulate::{Run, Sample, Scenario, SimulationSettings, Statistics, Summary};
+use clap::error::ErrorKind;
+use clap::{Args, CommandFactory, ValueEnum};
+use flqr_core::identify::Motor;
+use flqr_core::model_file::Model;
+use flqr_core::record;
+use flqr_core::robot::State;
+use flqr_core::simulate::{
+    self, BenchRun, ControllerChoice, Experiment, ExperimentError, Outcome, Run, Scenario, SpeedGains,
+    Statistics, StepResponse, Summary,
+};
+use nalgebra::{Matrix2x4, RowVector4};
 use serde::Serialize;
 
 use super::output::{Failure, Output, complain};
 use super::progress::Progress;
-use super::{file, gains, input};
+use super::{Cli, file, input};
 
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Model file (TOML) with a [robot] and an [lqr] table
+    /// Model file (TOML) that makes the controller: a [robot], or a rotary [axis] for experiments in the air
     model: PathBuf,
-    /// What the robot is put through: flat, kick
+    /// What the robot is put through: flat, bridge, kick, speed-tracking, friction-sweep, cruise, station,
+    /// multisine
     #[arg(long, value_name = "NAME", default_value = "flat")]
     scenario: Scenario,
-    /// LQR alone, or with the friction feedforward
+    /// State feedback without or with friction feedforward, or the speed control of wheels in the air
     #[arg(long, value_enum, default_value = "flqr")]
     controller: ControllerName,
-    /// Simulated time, s
-    #[arg(long, default_value_t = 60.0, value_parser = positive)]
-    seconds: f64,
-    /// Write the run as a robot log
+    /// Simulated time, s [default: 60, friction-sweep 120]
+    #[arg(long, value_parser = positive)]
+    seconds: Option<f64>,
+    /// Write the run as a robot log, in the air as a bench log of one motor
     #[arg(long, value_name = "OUT.csv")]
     log: Option<PathBuf>,
     /// Seed of all noise
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Motor of the bench log and of its statistics; a single shaft has only one
+    #[arg(long, value_enum, default_value = "left")]
+    motor: MotorName,
+    /// Gain of the speed control in the air, N m s/rad, with --ki [default: by scenario]
+    #[arg(long, requires = "ki", value_parser = not_negative)]
+    kp: Option<f64>,
+    /// Integral gain of the speed control in the air, N m/rad, with --kp
+    #[arg(long, requires = "kp", value_parser = not_negative)]
+    ki: Option<f64>,
+    /// Model file of the robot that is simulated, where it is not the one that makes the controller
+    #[arg(long, value_name = "ACTUAL.toml")]
+    robot: Option<PathBuf>,
+    /// Gain of each motor in place of the design: x, x_dot, pitch, pitch_rate
+    #[arg(long, value_name = "K1,K2,K3,K4", allow_hyphen_values = true)]
+    gain: Option<MotorGain>,
+    /// Height of the legs in place of the model's, m
+    #[arg(long, value_name = "M")]
+    leg_height: Option<f64>,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
 enum ControllerName {
     Lqr,
     Flqr,
+    Pi,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum MotorName {
+    Left,
+    Right,
+}
+
+/// One row of K.
+#[derive(Clone, Copy)]
+struct MotorGain([f64; 4]);
+
+impl FromStr for MotorGain {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let numbers: Result<Vec<f64>, _> = text.split(',').map(|entry| entry.trim().parse()).collect();
+        let entries = numbers.ok().and_then(|numbers| <[f64; 4]>::try_from(numbers).ok());
+        let finite = entries.filter(|entries| entries.iter().all(|entry| entry.is_finite()));
+        finite.map(Self).ok_or_else(|| "it must be four numbers, as in -0.6,-0.9,-6.6,-0.6".to_owned())
+    }
 }
 
 /// Keys of the JSON object.
 #[derive(Serialize)]
-struct Simulated {
+struct Simulated<'a> {
     statistics: Quantities,
-    settled: bool,
+    /// None in the air, where nothing can settle in this sense.
+    settled: Option<bool>,
     fell: bool,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    fall: Option<Fallen>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    target_x_m: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    tracking: Option<Tracking>,
+    warnings: &'a [String],
 }
 
 #[derive(Serialize)]
-struct Quantities {
-    x_m: Summary,
-    x_dot_m_s: Summary,
-    pitch_rad: Summary,
+#[serde(untagged)]
+enum Quantities {
+    Ground { x_m: Summary, x_dot_m_s: Summary, pitch_rad: Summary },
+    Bench { motor_speed_rad_s: Summary, torque_nm: Summary },
+}
+
+#[derive(Serialize)]
+struct Fallen {
+    time_s: f64,
+    state: State,
+}
+
+#[derive(Serialize)]
+struct Tracking {
+    left: StepResponse,
+    right: StepResponse,
 }
 
 fn positive(text: &str) -> Result<f64, String> {
@@ -62,58 +132,142 @@ fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
-pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
-    let (name, robot) = input::load_robot(&arguments.model)?;
-    let design = gains::design(&arguments.model, &robot)?;
-    let kind = match arguments.controller {
-        ControllerName::Lqr => ControllerKind::Lqr,
-        ControllerName::Flqr => ControllerKind::Flqr,
-    };
-    let in_file = |error: String| Failure::Message(format!("{}: {error}", arguments.model.display()));
-    let controller =
-        BalanceController::new(kind, &robot, design.gain).map_err(|error| in_file(error.to_string()))?;
-    let settings = SimulationSettings { seed: arguments.seed, ..SimulationSettings::default() };
-    let bar = Progress::new("simulating");
-    let run = arguments
-        .scenario
-        .run(&robot, controller, settings, arguments.seconds, &mut |sample: &Sample| {
-            bar.set((1000.0 * sample.time_s) as u64, (1000.0 * arguments.seconds) as u64);
-            ControlFlow::Continue(())
-        })
-        .map_err(|error| in_file(error.to_string()))?;
-    drop(bar);
-    if let Some(path) = &arguments.log {
-        write_log(path, &run.samples)?;
+fn not_negative(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(gain) if gain.is_finite() && gain >= 0.0 => Ok(gain),
+        _ => Err("it must be a number, 0 or above".to_owned()),
     }
-    report(output, &name, &run)
 }
 
-fn write_log(path: &Path, samples: &[Sample]) -> Result<(), Failure> {
-    let rows: Vec<_> = samples.iter().map(Sample::to_row).collect();
-    let columns = Sample::COLUMNS
-        .iter()
-        .enumerate()
-        .map(|(index, name)| (*name, rows.iter().map(|row| row[index]).collect::<Vec<_>>()));
-    let log = Log::from_columns(path.display().to_string(), columns);
+pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
+    let experiment = experiment(arguments);
+    if experiment.controller == ControllerChoice::Pi && experiment.on_ground() {
+        let refused = ExperimentError::PiOnGround { scenario: experiment.scenario };
+        Cli::command().error(ErrorKind::ArgumentConflict, refused).exit();
+    }
+    let declared = input::load_model(&arguments.model)?;
+    let actual = arguments.robot.as_deref().map(input::load_model).transpose()?;
+    let actual = actual.as_ref().unwrap_or(&declared);
+    let in_file = |error: ExperimentError| match error {
+        ExperimentError::NotFinite { problem, .. } => Failure::from_error(problem),
+        error => Failure::Message(format!("{}: {error}", arguments.model.display())),
+    };
+    let warnings = experiment.check(&declared, actual).map_err(in_file)?;
+    warnings.iter().for_each(|warning| complain(&format!("warning: {warning}")));
+    let outcome = simulated(&experiment, &declared, actual);
+    let kept = match &outcome {
+        Ok(outcome) => Some(outcome),
+        Err(ExperimentError::NotFinite { kept, .. }) => Some(&**kept),
+        Err(_) => None,
+    };
+    let motor = match arguments.motor {
+        MotorName::Left => Motor::Left,
+        MotorName::Right => Motor::Right,
+    };
+    if let (Some(path), Some(kept)) = (&arguments.log, kept) {
+        write_log(path, kept, motor)?;
+    }
+    report(output, &declared.name, &outcome.map_err(in_file)?, motor)
+}
+
+fn experiment(arguments: &Arguments) -> Experiment {
+    let controller = match arguments.controller {
+        ControllerName::Lqr => ControllerChoice::Lqr,
+        ControllerName::Flqr => ControllerChoice::Flqr,
+        ControllerName::Pi => ControllerChoice::Pi,
+    };
+    let default = Experiment::new(arguments.scenario, controller);
+    Experiment {
+        seconds: arguments.seconds.unwrap_or(default.seconds),
+        seed: arguments.seed,
+        speed_gains: arguments.kp.zip(arguments.ki).map(|(kp, ki)| SpeedGains { kp, ki }),
+        gain: arguments.gain.map(|MotorGain(row)| Matrix2x4::from_rows(&[RowVector4::from(row); 2])),
+        leg_height_m: arguments.leg_height,
+        ..default
+    }
+}
+
+fn simulated(experiment: &Experiment, declared: &Model, actual: &Model) -> Result<Outcome, ExperimentError> {
+    let bar = Progress::new("simulating");
+    simulate::run(experiment, declared, actual, &mut |share| {
+        bar.set((1000.0 * share) as u64, 1000);
+        ControlFlow::Continue(())
+    })
+}
+
+fn write_log(path: &Path, outcome: &Outcome, motor: Motor) -> Result<(), Failure> {
+    let log = outcome.log(motor);
     file::write(path, "log", |out| record::write_log(&log, out))
 }
 
-fn report(output: &Output, name: &str, run: &Run) -> Result<(), Failure> {
+fn report(output: &Output, name: &str, outcome: &Outcome, motor: Motor) -> Result<(), Failure> {
+    match outcome {
+        Outcome::Ground(run) => report_ground(output, name, run),
+        Outcome::Bench(run) => report_bench(output, name, run, motor),
+    }
+}
+
+fn report_ground(output: &Output, name: &str, run: &Run) -> Result<(), Failure> {
     let Statistics { from_s, x_m, x_dot_m_s, pitch_rad, settled, fell } = run.statistics;
-    let keys = Simulated { statistics: Quantities { x_m, x_dot_m_s, pitch_rad }, settled, fell };
+    let keys = Simulated {
+        statistics: Quantities::Ground { x_m, x_dot_m_s, pitch_rad },
+        settled: Some(settled),
+        fell,
+        fall: run.fall.map(|fall| Fallen { time_s: fall.time_s, state: fall.state }),
+        target_x_m: Some(run.target_x_m),
+        tracking: None,
+        warnings: &run.warnings,
+    };
     if let Some(fall) = &run.fall {
-        complain(&format!("the robot fell at {:.3} s", fall.time_s));
+        let State { x_m, x_dot_m_s, pitch_rad, pitch_rate_rad_s } = fall.state;
+        complain(&format!(
+            "the robot fell at {:.3} s with x {x_m:.3} m, x_dot {x_dot_m_s:.3} m/s, pitch {pitch_rad:.3} rad, \
+             pitch rate {pitch_rate_rad_s:.3} rad/s",
+            fall.time_s
+        ));
     }
     output.result(&keys, |out| {
-        writeln!(out, "{name}, from {from_s} s on\n")?;
-        writeln!(out, "{:12}{:>12}{:>12}{:>12}{:>12}", "", "min", "max", "mean", "std")?;
-        for (label, Summary { min, max, mean, std }) in
-            [("x, m", x_m), ("x_dot, m/s", x_dot_m_s), ("pitch, rad", pitch_rad)]
-        {
-            writeln!(out, "{label:12}{min:>12.4}{max:>12.4}{mean:>12.4}{std:>12.4}")?;
-        }
+        writeln!(out, "{name}, from {from_s} s on, target x {} m\n", run.target_x_m)?;
+        table(out, &[("x, m", x_m), ("x_dot, m/s", x_dot_m_s), ("pitch, rad", pitch_rad)])?;
         writeln!(out, "\nsettled: {}, fell: {}", yes(settled), yes(fell))
     })
+}
+
+fn report_bench(output: &Output, name: &str, run: &BenchRun, motor: Motor) -> Result<(), Failure> {
+    let [motor_speed_rad_s, torque_nm] = run.statistics(motor);
+    let keys = Simulated {
+        statistics: Quantities::Bench { motor_speed_rad_s, torque_nm },
+        settled: None,
+        fell: false,
+        fall: None,
+        target_x_m: None,
+        tracking: run.tracking.map(|[left, right]| Tracking { left, right }),
+        warnings: &run.warnings,
+    };
+    output.result(&keys, |out| {
+        writeln!(out, "{name}, {motor:?} motor\n")?;
+        table(out, &[("speed, rad/s", motor_speed_rad_s), ("torque, N m", torque_nm)])?;
+        let Some(tracking) = run.tracking else { return Ok(()) };
+        writeln!(
+            out,
+            "\n{:12}{:>14}{:>18}{:>20}",
+            "", "rise time, s", "overshoot, rad/s", "steady error, rad/s"
+        )?;
+        for (label, response) in ["left", "right"].iter().zip(tracking) {
+            let rise = response.rise_time_s.map_or("never".to_owned(), |time| format!("{time:.4}"));
+            let (overshoot, error) = (response.overshoot_rad_s, response.steady_error_rad_s);
+            writeln!(out, "{label:12}{rise:>14}{overshoot:>18.4}{error:>20.4}")?;
+        }
+        Ok(())
+    })
+}
+
+fn table(out: &mut dyn Write, rows: &[(&str, Summary)]) -> io::Result<()> {
+    writeln!(out, "{:12}{:>12}{:>12}{:>12}{:>12}", "", "min", "max", "mean", "std")?;
+    for (label, Summary { min, max, mean, std }) in rows {
+        writeln!(out, "{label:12}{min:>12.4}{max:>12.4}{mean:>12.4}{std:>12.4}")?;
+    }
+    Ok(())
 }
 
 fn yes(is: bool) -> &'static str {

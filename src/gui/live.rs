@@ -259,7 +259,7 @@ impl Worker {
             LiveCommand::Pause(paused) => self.paused = paused,
             LiveCommand::Push { force_n, duration_s } => {
                 if let Some(plant) = &mut self.plant {
-                    plant.simulation.push(force_n, duration_s);
+                    plant.simulation.push(force_n, duration_s, None);
                 }
                 return ControlFlow::Continue(());
             }
@@ -297,8 +297,9 @@ impl Worker {
         for _ in 0..steps {
             let sample = plant.simulation.step();
             self.pending.push(Sample { time_s: sample.time_s + plant.start_s, ..sample });
-            if plant.simulation.fall().is_some() {
+            if plant.simulation.has_ended() {
                 self.fell = true;
+                self.problem = plant.simulation.not_finite().map(ToString::to_string);
                 return;
             }
         }

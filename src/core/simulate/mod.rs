@@ -5,8 +5,11 @@
 //! seconds, and a run is to be the same everywhere.
 
 mod actuator;
+mod balance_run;
 mod bench_plant;
+mod bench_run;
 mod change;
+mod experiment;
 mod ground;
 mod noise;
 mod planar;
@@ -17,18 +20,24 @@ mod scenario;
 mod sensors;
 mod simulation;
 mod statistics;
+mod tracking;
 
 pub use actuator::Actuator;
+pub use balance_run::{Run, TimedPose};
 pub use bench_plant::BenchPlant;
+pub use bench_run::{BenchRun, SpeedGains};
+pub use experiment::{ControllerChoice, Experiment, ExperimentError, Outcome, Push, run};
 pub use ground::Ground;
 pub use planar::{Forcing, PlanarPlant, advance_batch};
 pub use plant::{Plant, Pose};
 pub use response::predicted_response;
-pub use sample::Sample;
-pub use scenario::{Push, Run, Scenario, UnknownScenario};
-pub use sensors::SensorSettings;
-pub use simulation::{FALL_PITCH_RAD, Fall, Simulation, SimulationError, SimulationSettings, TICK_S};
+pub use sample::{BenchSample, Sample};
+pub use scenario::{Scenario, UnknownScenario};
+pub use simulation::{
+    Command, FALL_PITCH_RAD, Fall, NotFinite, Simulation, SimulationError, SimulationSettings, TICK_S,
+};
 pub use statistics::{Statistics, Summary};
+pub use tracking::StepResponse;
 
 #[cfg(test)]
 mod tests;

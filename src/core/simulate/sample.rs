@@ -1,12 +1,15 @@
-//! One row of the simulated robot's recorder.
+//! Rows of the simulated robot's recorder.
 
+use crate::control::Readings;
+use crate::identify::Motor;
 use crate::record::schema;
+use crate::robot::State;
 
 /// What the robot's recorder writes at one tick: measured values, and the torque that was asked of the
 /// motors. The columns are those of a robot log.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
-    /// Time since the start, s.
+    /// Time since the start as the recorder stamped it, s.
     pub time_s: f64,
     /// Displacement from encoders and IMU, m.
     pub x_m: f64,
@@ -31,6 +34,22 @@ pub struct Sample {
 }
 
 impl Sample {
+    pub(super) fn new(time_s: f64, readings: &Readings, state: &State, asked_nm: [f64; 2]) -> Self {
+        Self {
+            time_s,
+            x_m: state.x_m,
+            x_dot_m_s: state.x_dot_m_s,
+            pitch_rad: state.pitch_rad,
+            pitch_rate_rad_s: state.pitch_rate_rad_s,
+            motor_angle_left_rad: readings.motor_angle_rad[0],
+            motor_angle_right_rad: readings.motor_angle_rad[1],
+            motor_speed_left_rad_s: readings.motor_speed_rad_s[0],
+            motor_speed_right_rad_s: readings.motor_speed_rad_s[1],
+            torque_left_nm: asked_nm[0],
+            torque_right_nm: asked_nm[1],
+        }
+    }
+
     /// Names of the columns of a robot log, in the order of [`Sample::to_row`].
     pub const COLUMNS: [&'static str; 11] = schema::ROBOT;
 
@@ -48,6 +67,40 @@ impl Sample {
             self.motor_speed_right_rad_s,
             self.torque_left_nm,
             self.torque_right_nm,
+        ]
+    }
+}
+
+/// What is recorded of two motors with their wheels in the air, left then right; of a single shaft both
+/// entries are the same.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BenchSample {
+    /// Time since the start as the recorder stamped it, s.
+    pub time_s: f64,
+    /// Encoders, rad.
+    pub motor_angle_rad: [f64; 2],
+    /// Measured speeds, rad/s.
+    pub motor_speed_rad_s: [f64; 2],
+    /// Torques asked of the motors, N m.
+    pub torque_nm: [f64; 2],
+    /// Speed that both are to have, rad/s.
+    pub target_speed_rad_s: f64,
+}
+
+impl BenchSample {
+    /// Names of the columns of a bench log, in the order of [`BenchSample::to_row`].
+    pub const COLUMNS: [&'static str; 5] =
+        ["time_s", "motor_angle_rad", "torque_nm", "motor_speed_rad_s", "target_speed_rad_s"];
+
+    /// The values of one motor in the order of [`BenchSample::COLUMNS`].
+    pub fn to_row(&self, motor: Motor) -> [f64; 5] {
+        let motor = motor as usize;
+        [
+            self.time_s,
+            self.motor_angle_rad[motor],
+            self.torque_nm[motor],
+            self.motor_speed_rad_s[motor],
+            self.target_speed_rad_s,
         ]
     }
 }

@@ -1,128 +1,131 @@
-//! The paper's balance experiments on the simulated robot.
+//! The experiments by name: what each is, what it is for and where its numbers come from.
 
-use std::ops::ControlFlow;
+use std::fmt;
 use std::str::FromStr;
 
-use super::sample::Sample;
-use super::simulation::{Fall, Simulation, SimulationError, SimulationSettings, TICK_S};
-use super::statistics::Statistics;
-use crate::ParameterError;
-use crate::control::BalanceController;
-use crate::model_file::RobotModel;
-use crate::parameter::{finite, within};
-use crate::robot::State;
-
 /// Longest run, s: an hour, 320 MB of samples.
-const MAX_SECONDS: f64 = 3600.0;
-/// Pitch at the start of every scenario, rad: the robot is let go nearly upright (assumed).
-const START_PITCH_RAD: f64 = 0.05;
-
-/// A push at the body's centre of mass.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Push {
-    /// Start, s.
-    pub start_s: f64,
-    /// Force, forward positive, N.
-    pub force_n: f64,
-    /// Duration, s.
-    pub duration_s: f64,
-}
-
-impl Push {
-    /// The paper's kick comes at 8.5 s (section 4.4); force and duration are not given. Assumed: 30 N for
-    /// 0.1 s, which moves the robot about as far as the paper's.
-    pub const KICK: Self = Self { start_s: 8.5, force_n: 30.0, duration_s: 0.1 };
-}
+pub(super) const MAX_SECONDS: f64 = 3600.0;
 
 /// An experiment.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scenario {
-    /// Standing on flat ground from a small pitch.
+    /// Let go 0.05 rad off upright on level ground (section 4.4; the angle is assumed), to see whether the robot
+    /// comes to rest or hunts: Table 5.
     Flat,
-    /// The same with a push.
-    Kick(Push),
+    /// Drives 1 m onto a bridge under its left wheel and stands there (Table 6). Paper: a photograph.
+    /// Assumed: 0.04 m high, so that the body rolls by 0.1 rad, with ramps of 0.4 m, which the robot climbs at
+    /// 0.23 m/s, and a deck of 0.6 m. The drive lasts from 2 to 10 s whatever the duration of the run.
+    Bridge,
+    /// As `Flat`, with a kick at 8.5 s (Table 7).
+    Kick,
+    /// Wheels in the air, from rest to 5 rad/s under speed control (section 4.3; Figures 6, 7).
+    SpeedTracking,
+    /// Wheels in the air at 33 constant speeds from −50 to 50 rad/s, for the curve of friction (section 3.1;
+    /// Table 4). See [`SpeedSweep`](crate::identify::excitation::SpeedSweep).
+    FrictionSweep,
+    /// Out and back in laps of about 20 s at up to 0.4 m/s, a pace at which the pitch stays within 0.1 rad, to
+    /// compare models with a robot that moves. The laps fill the run.
+    Cruise,
+    /// Stands upright from rest: noise and friction alone.
+    Station,
+    /// Torques of many frequencies, 0.3 to 4.7 Hz, on top of the controller's, other ones left and right: from
+    /// below the balance's own 2 rad/s up to where it no longer follows. With `pi` the wheels are in the air.
+    Multisine,
 }
 
 /// A scenario's name that is not known.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("there is no scenario {name:?}: choose one of flat, kick")]
+#[error("there is no scenario {name:?}: choose one of {}", Scenario::ALL.map(Scenario::name).join(", "))]
 pub struct UnknownScenario {
     /// What was asked for.
     pub name: String,
+}
+
+impl Scenario {
+    /// Every scenario, the paper's balance experiments first.
+    pub const ALL: [Self; 8] = [
+        Self::Flat,
+        Self::Bridge,
+        Self::Kick,
+        Self::SpeedTracking,
+        Self::FrictionSweep,
+        Self::Cruise,
+        Self::Station,
+        Self::Multisine,
+    ];
+
+    /// Name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Flat => "flat",
+            Self::Bridge => "bridge",
+            Self::Kick => "kick",
+            Self::SpeedTracking => "speed-tracking",
+            Self::FrictionSweep => "friction-sweep",
+            Self::Cruise => "cruise",
+            Self::Station => "station",
+            Self::Multisine => "multisine",
+        }
+    }
+
+    /// Name for people.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Flat => "Flat ground",
+            Self::Bridge => "Single-sided bridge",
+            Self::Kick => "Kick",
+            Self::SpeedTracking => "Speed tracking",
+            Self::FrictionSweep => "Friction sweep",
+            Self::Cruise => "Cruise",
+            Self::Station => "Station keeping",
+            Self::Multisine => "Multisine",
+        }
+    }
+
+    /// What it is, in one sentence.
+    pub fn description(self) -> &'static str {
+        match self {
+            Self::Flat => "Let go 0.05 rad off upright on level ground: does the robot come to rest or hunt?",
+            Self::Bridge => {
+                "Drives 1 m forward, its left wheel up a ramp onto a deck of 0.04 m, and stands there rolled."
+            }
+            Self::Kick => "Stands on level ground and is kicked at 8.5 s.",
+            Self::SpeedTracking => "Wheels in the air: from rest to 5 rad/s under PI speed control.",
+            Self::FrictionSweep => {
+                "Wheels in the air: 33 constant speeds from −50 to 50 rad/s, for the curve of friction."
+            }
+            Self::Cruise => "Drives out and back in smooth laps.",
+            Self::Station => "Stands upright from rest: noise and friction alone.",
+            Self::Multisine => {
+                "Torques of many frequencies on top of the controller's, to identify masses and inertias from."
+            }
+        }
+    }
+
+    /// Whether the robot stands on the ground; otherwise its wheels are in the air. A multisine under `pi` has
+    /// them in the air as well.
+    pub fn on_ground(self) -> bool {
+        !matches!(self, Self::SpeedTracking | Self::FrictionSweep)
+    }
+
+    /// Duration where none is asked for, s: a minute; two for the sweep, whose means over each speed are so
+    /// much the better.
+    pub fn default_seconds(self) -> f64 {
+        if self == Self::FrictionSweep { 120.0 } else { 60.0 }
+    }
+}
+
+impl fmt::Display for Scenario {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(self.name())
+    }
 }
 
 impl FromStr for Scenario {
     type Err = UnknownScenario;
 
     fn from_str(name: &str) -> Result<Self, UnknownScenario> {
-        match name {
-            "flat" => Ok(Self::Flat),
-            "kick" => Ok(Self::Kick(Push::KICK)),
-            _ => Err(UnknownScenario { name: name.to_owned() }),
-        }
-    }
-}
-
-/// What came of a run.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Run {
-    /// What the robot recorded, one row every 1 ms from 0, until the end, a fall or a stop by the watcher.
-    pub samples: Vec<Sample>,
-    /// Statistics of the samples.
-    pub statistics: Statistics,
-    /// The fall that ended the run, if there was one.
-    pub fall: Option<Fall>,
-}
-
-impl Scenario {
-    /// Runs the scenario for `seconds` (above 0, at most 3600, rounded to 1 ms) with the settings'
-    /// sensors, delay, noise and seed; the initial state is the scenario's own. `watch` sees every sample
-    /// and may stop the run.
-    ///
-    /// # Errors
-    /// Robot, settings, push or duration out of range.
-    pub fn run(
-        &self,
-        robot: &RobotModel,
-        controller: BalanceController,
-        settings: SimulationSettings,
-        seconds: f64,
-        watch: &mut dyn FnMut(&Sample) -> ControlFlow<()>,
-    ) -> Result<Run, SimulationError> {
-        within("seconds", seconds, TICK_S..=MAX_SECONDS, "from 0.001 to 3600")?;
-        self.validate()?;
-        let initial = State { pitch_rad: START_PITCH_RAD, ..State::default() };
-        let mut simulation = Simulation::new(robot, controller, SimulationSettings { initial, ..settings })?;
-        let ticks = (seconds / TICK_S).round() as usize;
-        let mut samples = Vec::with_capacity(ticks);
-        for _ in 0..ticks {
-            self.act(&mut simulation);
-            let sample = simulation.step();
-            samples.push(sample);
-            if watch(&sample).is_break() || simulation.fall().is_some() {
-                break;
-            }
-        }
-        let fall = simulation.fall().copied();
-        let measured = Statistics::of(&samples).expect("a run has at least one sample");
-        // The IMU may not have seen the fall that ended the run.
-        let fell = measured.fell || fall.is_some();
-        let statistics = Statistics { fell, settled: measured.settled && !fell, ..measured };
-        Ok(Run { samples, statistics, fall })
-    }
-
-    fn validate(&self) -> Result<(), ParameterError> {
-        let Self::Kick(push) = self else { return Ok(()) };
-        within("start_s", push.start_s, 0.0..=MAX_SECONDS, "from 0 to 3600")?;
-        within("duration_s", push.duration_s, 0.0..=MAX_SECONDS, "from 0 to 3600")?;
-        finite("force_n", push.force_n)
-    }
-
-    fn act(&self, simulation: &mut Simulation) {
-        if let Self::Kick(push) = self
-            && simulation.time_s() == (push.start_s / TICK_S).round() / 1000.0
-        {
-            simulation.push(push.force_n, push.duration_s);
-        }
+        let named = Self::ALL.into_iter().find(|scenario| scenario.name() == name);
+        named.ok_or_else(|| UnknownScenario { name: name.to_owned() })
     }
 }

@@ -1,42 +1,33 @@
-//! The closed loop: sensors, controller, transport delay, motors, plant.
+//! The closed loop: sensors, controller, the way to the motors, plant.
 
-use std::collections::VecDeque;
-
+use super::actuator::Actuator;
+use super::ground::Ground;
 use super::noise::Noise;
-use super::planar::{Forcing, PlanarPlant};
+use super::planar::Forcing;
+use super::plant::{Plant, Pose};
 use super::sample::Sample;
-use super::sensors::{SensorSettings, Sensors};
+use super::sensors::Sensors;
 use crate::ParameterError;
-use crate::control::{BalanceController, Reference};
+use crate::control::{BalanceController, Measurement, Readings, Reference};
 use crate::model_file::RobotModel;
-use crate::parameter::{finite, not_negative, within};
+use crate::parameter::{finite, within};
 use crate::robot::State;
 
 /// Time from one control tick to the next, s.
 pub const TICK_S: f64 = 0.001;
 /// Pitch beyond which the robot has fallen, rad.
 pub const FALL_PITCH_RAD: f64 = 0.8;
-/// Longest transport delay, ticks.
-const MAX_DELAY_TICKS: u32 = 1000;
 /// Random streams of a seed: torque noise, then those of the sensors.
-const TORQUE_STREAM: u64 = 0;
-const SENSOR_STREAM: u64 = 2;
+pub(super) const TORQUE_STREAM: u64 = 0;
+pub(super) const SENSOR_STREAM: u64 = 2;
 
-/// How a robot is simulated.
+/// How a robot is simulated. Its sensors, delays and noises are the model's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SimulationSettings {
     /// Seed of all noise.
     pub seed: u64,
     /// State at the start.
     pub initial: State,
-    /// Sensors.
-    pub sensors: SensorSettings,
-    /// Ticks of 1 ms from a measurement to the torque that answers it. Default: 4 (assumed: IMU parsing,
-    /// two passes over CAN and the threads between, which the paper describes but does not time).
-    pub delay_ticks: u32,
-    /// Standard deviation of each motor's torque about the asked one, new at every tick, N m. Default:
-    /// 0.02 (assumed: ripple and current control, under 1 % of the paper's motors' rated 2.42 N m).
-    pub torque_noise_nm: f64,
     /// Integration steps a tick. Default: 4, 0.25 ms each; four times as many change the path by less than
     /// 5e-6 in SI units over 3 s with many stops.
     pub substeps: u32,
@@ -44,14 +35,7 @@ pub struct SimulationSettings {
 
 impl Default for SimulationSettings {
     fn default() -> Self {
-        Self {
-            seed: 1,
-            initial: State::default(),
-            sensors: SensorSettings::default(),
-            delay_ticks: 4,
-            torque_noise_nm: 0.02,
-            substeps: 4,
-        }
+        Self { seed: 1, initial: State::default(), substeps: 4 }
     }
 }
 
@@ -69,24 +53,49 @@ pub struct Fall {
     pub state: State,
 }
 
+/// Where a motion stopped being one.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "the motion is not finite from step {step} ({time_s} s) on: look for extreme masses, lengths, friction or \
+     stiffnesses in the model"
+)]
+pub struct NotFinite {
+    /// Tick of 1 ms, counted from 1, during which it happened.
+    pub step: u64,
+    /// End of that tick, s.
+    pub time_s: f64,
+}
+
+/// What is asked of the robot at one tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Command {
+    /// Where it is to be.
+    pub reference: Reference,
+    /// Torque on top of the controller's, left and right, N m; excites motions to identify from.
+    pub added_torque_nm: [f64; 2],
+}
+
 /// A simulated robot under control, one tick of 1 ms at a time.
 #[derive(Clone, Debug)]
 pub struct Simulation {
     controller: BalanceController,
-    settings: SimulationSettings,
-    push_height_m: f64,
-    plant: PlanarPlant,
+    substeps: u32,
+    com_height_m: f64,
+    torque_noise_nm: f64,
+    plant: Plant,
     sensors: Sensors,
+    actuators: [Actuator; 2],
     torque_noise: [Noise; 2],
-    under_way: VecDeque<[f64; 2]>,
-    push_n: f64,
+    push: Forcing,
     push_ticks_left: u64,
     tick: u64,
     fall: Option<Fall>,
+    not_finite: Option<NotFinite>,
 }
 
 impl Simulation {
-    /// A robot at its initial state, before the first tick.
+    /// A robot on its model's ground at its initial state, before the first tick. The controller may have
+    /// been made from another model.
     ///
     /// # Errors
     /// Robot or settings out of range.
@@ -95,49 +104,53 @@ impl Simulation {
         controller: BalanceController,
         settings: SimulationSettings,
     ) -> Result<Self, SimulationError> {
-        robot.parameters.validate()?;
+        Self::on_ground(robot, controller, settings, &[const { Ground::flat() }; 2])
+    }
+
+    /// The same with a ground of its own under the left and the right wheel.
+    ///
+    /// # Errors
+    /// Robot, settings or ground out of range.
+    pub fn on_ground(
+        robot: &RobotModel,
+        controller: BalanceController,
+        settings: SimulationSettings,
+        grounds: &[Ground; 2],
+    ) -> Result<Self, SimulationError> {
+        robot.validate()?;
         settings.validate()?;
-        let radius = robot.parameters.wheel_radius_m;
+        grounds.iter().try_for_each(Ground::validate)?;
         Ok(Self {
             controller,
-            settings,
-            push_height_m: robot.parameters.com_height_m,
-            plant: PlanarPlant::new(&robot.parameters, robot.friction, &settings.initial),
-            sensors: Sensors::new(settings.sensors, radius, settings.seed, SENSOR_STREAM),
+            substeps: settings.substeps,
+            com_height_m: robot.parameters.com_height_m,
+            torque_noise_nm: robot.actuation.torque_noise_nm,
+            plant: Plant::on_ground(robot, grounds, &settings.initial),
+            sensors: Sensors::new(robot.sensors, settings.seed, SENSOR_STREAM),
+            actuators: [(); 2].map(|()| Actuator::new(&robot.limits, &robot.actuation)),
             torque_noise: [0, 1].map(|motor| Noise::new(settings.seed, TORQUE_STREAM + motor)),
-            under_way: std::iter::repeat_n([0.0; 2], settings.delay_ticks as usize).collect(),
-            push_n: 0.0,
+            push: Forcing::default(),
             push_ticks_left: 0,
             tick: 0,
             fall: None,
+            not_finite: None,
         })
     }
 
-    /// One tick: read the sensors, ask the controller, move on by 1 ms under the torques that were asked
-    /// for `delay_ticks` earlier. After a fall the motors are off, the robot stays where it fell and so
-    /// does the clock.
+    /// One tick of keeping the station x = 0; see [`Simulation::step_to`].
     pub fn step(&mut self) -> Sample {
-        let readings = self.sensors.read(&self.plant, self.tick);
-        let asked = if self.fall.is_some() {
-            [0.0; 2]
-        } else {
-            self.controller.step(&readings.measurement, &Reference::default())
-        };
-        let state = readings.measurement.state;
-        let sample = Sample {
-            time_s: self.time_s(),
-            x_m: state.x_m,
-            x_dot_m_s: state.x_dot_m_s,
-            pitch_rad: state.pitch_rad,
-            pitch_rate_rad_s: state.pitch_rate_rad_s,
-            motor_angle_left_rad: readings.motor_angle_rad[0],
-            motor_angle_right_rad: readings.motor_angle_rad[1],
-            motor_speed_left_rad_s: readings.measurement.motor_speed_rad_s[0],
-            motor_speed_right_rad_s: readings.measurement.motor_speed_rad_s[1],
-            torque_left_nm: asked[0],
-            torque_right_nm: asked[1],
-        };
-        if self.fall.is_none() {
+        self.step_to(&Command::default())
+    }
+
+    /// One tick: read the sensors, ask the controller, move on by 1 ms under the torques that were asked for
+    /// a delay earlier. After a fall, or where the motion is no longer finite, the motors are off, the robot
+    /// stays where it is and so does the clock.
+    pub fn step_to(&mut self, command: &Command) -> Sample {
+        let readings = self.sensors.read(&self.truth(), self.tick);
+        let measurement = self.controller.odometry.measurement(&readings);
+        let asked = if self.has_ended() { [0.0; 2] } else { self.asked(&measurement, command) };
+        let sample = Sample::new(self.sensors.stamp(self.tick), &readings, &measurement.state, asked);
+        if !self.has_ended() {
             self.advance(asked);
         }
         sample
@@ -148,14 +161,16 @@ impl Simulation {
         self.controller = controller;
     }
 
-    /// Pushes the body at its centre of mass from the next tick on, forward positive; replaces a push that
-    /// still acts. The duration is rounded to whole ticks.
-    pub fn push(&mut self, force_n: f64, duration_s: f64) {
-        self.push_n = force_n;
+    /// Pushes the body from the next tick on, forward positive, at a height above the axle along the body (at
+    /// its centre of mass if none is given, m); replaces a push that still acts. The duration is rounded to
+    /// whole ticks.
+    pub fn push(&mut self, force_n: f64, duration_s: f64, height_m: Option<f64>) {
+        let push_height_m = height_m.unwrap_or(self.com_height_m);
+        self.push = Forcing { push_n: force_n, push_height_m, ..Forcing::default() };
         self.push_ticks_left = (duration_s / TICK_S).round().max(0.0) as u64;
     }
 
-    /// Time of the next sample, s.
+    /// Time of the next tick, s.
     pub fn time_s(&self) -> f64 {
         self.tick as f64 / 1000.0
     }
@@ -165,13 +180,18 @@ impl Simulation {
         self.plant.state()
     }
 
-    /// True motor angle q, rad.
-    pub fn motor_angle_rad(&self) -> f64 {
+    /// The true state with heading, roll and the ground below.
+    pub fn pose(&self) -> Pose {
+        self.plant.pose()
+    }
+
+    /// True motor angles q, left and right, rad.
+    pub fn motor_angle_rad(&self) -> [f64; 2] {
         self.plant.motor_angle_rad()
     }
 
     /// Whether friction holds the motor shafts just now.
-    pub fn stuck(&self) -> bool {
+    pub fn stuck(&self) -> [bool; 2] {
         self.plant.stuck()
     }
 
@@ -180,21 +200,50 @@ impl Simulation {
         self.fall.as_ref()
     }
 
-    fn advance(&mut self, asked: [f64; 2]) {
-        self.under_way.push_back(asked);
-        let arrived = self.under_way.pop_front().expect("a torque has just been pushed");
-        let mut torque_nm = arrived;
-        for (torque, noise) in torque_nm.iter_mut().zip(&mut self.torque_noise) {
-            *torque += noise.normal(self.settings.torque_noise_nm);
+    /// Where the motion stopped being finite, if it did.
+    pub fn not_finite(&self) -> Option<&NotFinite> {
+        self.not_finite.as_ref()
+    }
+
+    /// Whether the robot has fallen or its motion is no longer finite.
+    pub fn has_ended(&self) -> bool {
+        self.fall.is_some() || self.not_finite.is_some()
+    }
+
+    fn truth(&self) -> Readings {
+        let state = self.plant.state();
+        Readings {
+            motor_angle_rad: self.plant.motor_angle_rad(),
+            motor_speed_rad_s: self.plant.motor_speed_rad_s(),
+            pitch_rad: state.pitch_rad,
+            pitch_rate_rad_s: state.pitch_rate_rad_s,
         }
-        let push_n = if self.push_ticks_left > 0 { self.push_n } else { 0.0 };
+    }
+
+    fn asked(&self, measurement: &Measurement, command: &Command) -> [f64; 2] {
+        let controlled = self.controller.step(measurement, &command.reference);
+        let limit = self.controller.torque_limit_nm.max(0.0);
+        std::array::from_fn(|motor| {
+            let added = command.added_torque_nm[motor];
+            if added == 0.0 { controlled[motor] } else { (controlled[motor] + added).clamp(-limit, limit) }
+        })
+    }
+
+    fn advance(&mut self, asked: [f64; 2]) {
+        let speeds = self.plant.motor_speed_rad_s();
+        let mut torque_nm = [0.0; 2];
+        for motor in 0..2 {
+            let noise = self.torque_noise[motor].normal(self.torque_noise_nm);
+            torque_nm[motor] = self.actuators[motor].step(asked[motor], speeds[motor]) + noise;
+        }
+        let push = if self.push_ticks_left > 0 { self.push } else { Forcing::default() };
         self.push_ticks_left = self.push_ticks_left.saturating_sub(1);
-        let forcing = Forcing { torque_nm, push_n, push_height_m: self.push_height_m };
-        self.plant.advance(&forcing, TICK_S, self.settings.substeps);
+        self.plant.advance(&Forcing { torque_nm, ..push }, TICK_S, self.substeps);
         self.tick += 1;
         let state = self.plant.state();
-        // A pitch that is not a number is a fall as well.
-        if state.pitch_rad.abs() > FALL_PITCH_RAD || state.pitch_rad.is_nan() {
+        if !self.plant.is_finite() {
+            self.not_finite = Some(NotFinite { step: self.tick, time_s: self.time_s() });
+        } else if state.pitch_rad.abs() > FALL_PITCH_RAD {
             self.fall = Some(Fall { time_s: self.time_s(), state });
         }
     }
@@ -206,14 +255,6 @@ impl SimulationSettings {
         finite("x_dot_m_s", self.initial.x_dot_m_s)?;
         finite("pitch_rate_rad_s", self.initial.pitch_rate_rad_s)?;
         within("pitch_rad", self.initial.pitch_rad, -FALL_PITCH_RAD..=FALL_PITCH_RAD, "from -0.8 to 0.8")?;
-        not_negative("torque_noise_nm", self.torque_noise_nm)?;
-        within(
-            "delay_ticks",
-            f64::from(self.delay_ticks),
-            0.0..=f64::from(MAX_DELAY_TICKS),
-            "from 0 to 1000",
-        )?;
-        within("substeps", f64::from(self.substeps), 1.0..=1000.0, "from 1 to 1000")?;
-        self.sensors.validate()
+        within("substeps", f64::from(self.substeps), 1.0..=1000.0, "from 1 to 1000")
     }
 }

@@ -1,4 +1,4 @@
-//! Statistics of a balance run, as in the paper's Tables 5 and 6.
+//! Statistics of runs, as in the paper's Tables 5 and 6.
 
 use serde::Serialize;
 
@@ -68,7 +68,7 @@ impl Statistics {
     }
 }
 
-fn summary(samples: &[Sample], value: impl Fn(&Sample) -> f64) -> Summary {
+pub(super) fn summary<T>(samples: &[T], value: impl Fn(&T) -> f64) -> Summary {
     let count = samples.len() as f64;
     let values = || samples.iter().map(&value);
     let mean = values().sum::<f64>() / count;

@@ -1,0 +1,262 @@
+//! Runs of two motors with their wheels in the air, or of one shaft on a bench.
+
+use std::ops::ControlFlow;
+
+use serde::Serialize;
+
+use super::actuator::Actuator;
+use super::balance_run::multisines;
+use super::bench_plant::BenchPlant;
+use super::noise::Noise;
+use super::sample::BenchSample;
+use super::sensors::Sensors;
+use super::simulation::{NotFinite, SENSOR_STREAM, SimulationSettings, TICK_S, TORQUE_STREAM};
+use super::statistics::{Summary, summary};
+use super::tracking::StepResponse;
+use crate::control::{Readings, SpeedPi, SpeedPiState};
+use crate::friction::Stribeck;
+use crate::identify::Motor;
+use crate::identify::excitation::{Multisine, SpeedSweep, Step};
+use crate::model_file::{AxisModel, RobotModel};
+use crate::robot::{Actuation, MotorLimits, SensorSettings};
+
+/// What came of a run in the air.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BenchRun {
+    /// What was recorded, one row every 1 ms from 0, until the end or a stop by the watcher.
+    pub samples: Vec<BenchSample>,
+    /// How both motors followed a step of the target; none in runs without one.
+    pub tracking: Option<[StepResponse; 2]>,
+    /// What was known before the run.
+    pub warnings: Vec<String>,
+    /// Where the motion stopped being finite, if it did; the samples end there.
+    pub(super) not_finite: Option<NotFinite>,
+}
+
+impl BenchRun {
+    /// Statistics of one motor's measured speed, rad/s, and torque, N m, over the whole run.
+    pub fn statistics(&self, motor: Motor) -> [Summary; 2] {
+        let motor = motor as usize;
+        [
+            summary(&self.samples, |sample| sample.motor_speed_rad_s[motor]),
+            summary(&self.samples, |sample| sample.torque_nm[motor]),
+        ]
+    }
+}
+
+/// Gains of the speed control, as the paper's kp and ki.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct SpeedGains {
+    /// kp, N m s/rad.
+    pub kp: f64,
+    /// ki, N m/rad.
+    pub ki: f64,
+}
+
+impl SpeedGains {
+    /// The paper's first pair (Figures 6a, 7a).
+    pub const PAPER: Self = Self { kp: 0.5, ki: 0.05 };
+
+    /// For constant speeds: with a crossover of 80 rad/s the shaft turns at 0.1 rad/s although friction falls
+    /// with speed there, 4 ms of delay cost 0.3 rad of phase, and an error is gone within 0.1 s.
+    pub fn firm(inertia_kg_m2: f64) -> Self {
+        Self { kp: 80.0 * inertia_kg_m2, ki: 1600.0 * inertia_kg_m2 }
+    }
+
+    /// Keeps the mean speed near its target and leaves the shaft to an excitation.
+    pub fn loose(inertia_kg_m2: f64) -> Self {
+        Self { kp: 20.0 * inertia_kg_m2, ki: 20.0 * inertia_kg_m2 }
+    }
+
+    /// Phase margin of the loop with an inertia and a delay, by the sampled speed half a tick older, rad; not
+    /// above 0 where the loop is unstable.
+    pub(super) fn phase_margin_rad(self, inertia_kg_m2: f64, delay_s: f64) -> f64 {
+        let Self { kp, ki } = self;
+        // |kp + ki/(jω)| = I ω
+        let (p, i) = (kp / inertia_kg_m2, ki / inertia_kg_m2);
+        let crossover = (0.5 * (p * p + (p.powi(4) + 4.0 * i * i).sqrt())).sqrt();
+        libm::atan2(p * crossover, i) - crossover * (delay_s + 0.5 * TICK_S)
+    }
+}
+
+/// A motor with its wheel in the air, its command line and its sensors.
+#[derive(Clone, Debug)]
+pub(super) struct BenchRig {
+    pub(super) inertia_kg_m2: f64,
+    gravity_torque_nm: f64,
+    pub(super) friction: [Option<Stribeck>; 2],
+    limits: MotorLimits,
+    pub(super) actuation: Actuation,
+    sensors: SensorSettings,
+    /// One shaft in place of two.
+    single: bool,
+}
+
+impl BenchRig {
+    /// Both wheels of a robot.
+    pub(super) fn of_robot(robot: &RobotModel) -> Self {
+        Self {
+            inertia_kg_m2: robot.parameters.wheel_inertia_kg_m2,
+            gravity_torque_nm: 0.0,
+            friction: robot.friction,
+            limits: robot.limits,
+            actuation: robot.actuation,
+            sensors: robot.sensors,
+            single: false,
+        }
+    }
+
+    /// A rotary axis; none for a carriage.
+    pub(super) fn of_axis(axis: &AxisModel) -> Option<Self> {
+        let AxisModel::Rotary { inertia_kg_m2, gravity_torque_nm, friction } = *axis else { return None };
+        Some(Self {
+            inertia_kg_m2,
+            gravity_torque_nm,
+            friction: [friction; 2],
+            limits: MotorLimits::default(),
+            actuation: Actuation::default(),
+            sensors: SensorSettings::default(),
+            single: true,
+        })
+    }
+
+    pub(super) fn torque_limit_nm(&self) -> f64 {
+        self.limits.torque_nm.unwrap_or(f64::INFINITY)
+    }
+}
+
+/// What a scenario asks of the motors.
+pub(super) enum Program {
+    /// A step of the target speed.
+    Step(Step),
+    /// Constant speeds.
+    Sweep(SpeedSweep),
+    /// Torques on top of the speed control's.
+    Torques([Multisine; 2]),
+}
+
+impl Program {
+    /// A multisine that moves a shaft: 40 rad/s² of its inertia, and more than its friction.
+    pub(super) fn multisine(rig: &BenchRig) -> Self {
+        let level = |curve: &Option<Stribeck>| curve.map_or(0.0, |curve| curve.parameters().static_nm);
+        let friction_nm = rig.friction.iter().map(level).fold(0.0, f64::max);
+        Self::Torques(multisines(40.0 * rig.inertia_kg_m2 + 1.5 * friction_nm))
+    }
+
+    fn target_rad_s(&self, time_s: f64) -> f64 {
+        match self {
+            Self::Step(step) => step.at(time_s),
+            Self::Sweep(sweep) => sweep.at(time_s),
+            Self::Torques(_) => 0.0,
+        }
+    }
+
+    fn added_nm(&self, motor: usize, time_s: f64) -> f64 {
+        if let Self::Torques(motors) = self { motors[motor].at(time_s) } else { 0.0 }
+    }
+}
+
+/// Both motors in motion.
+struct Bench<'a> {
+    rig: &'a BenchRig,
+    control: &'a [SpeedPi; 2],
+    memory: [SpeedPiState; 2],
+    shafts: [BenchPlant; 2],
+    actuators: [Actuator; 2],
+    torque_noise: [Noise; 2],
+    sensors: Sensors,
+}
+
+/// Runs a program for `ticks` under the speed control; `watch` hears the share that is done.
+pub(super) fn run(
+    rig: &BenchRig,
+    control: &[SpeedPi; 2],
+    program: &Program,
+    ticks: usize,
+    seed: u64,
+    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> BenchRun {
+    let mut bench = Bench::new(rig, control, seed);
+    let mut samples: Vec<BenchSample> = Vec::with_capacity(ticks);
+    let mut not_finite = None;
+    for tick in 0..ticks {
+        if tick.is_multiple_of(10) && watch(tick as f64 / ticks as f64).is_break() && tick > 0 {
+            break;
+        }
+        samples.push(bench.step(tick as u64, program));
+        if !bench.shafts.iter().all(BenchPlant::is_finite) {
+            let step = tick as u64 + 1;
+            not_finite = Some(NotFinite { step, time_s: step as f64 / 1000.0 });
+            break;
+        }
+    }
+    let tracking = match program {
+        Program::Step(step) => Some([0, 1].map(|motor| StepResponse::of(&samples, motor, step))),
+        _ => None,
+    };
+    BenchRun { samples, tracking, warnings: Vec::new(), not_finite }
+}
+
+impl<'a> Bench<'a> {
+    fn new(rig: &'a BenchRig, control: &'a [SpeedPi; 2], seed: u64) -> Self {
+        let shaft = |motor: usize| {
+            BenchPlant::new(rig.inertia_kg_m2, rig.gravity_torque_nm, rig.friction[motor], 0.0, 0.0)
+        };
+        Self {
+            rig,
+            control,
+            memory: [SpeedPiState::default(); 2],
+            shafts: [0, 1].map(shaft),
+            actuators: [(); 2].map(|()| Actuator::new(&rig.limits, &rig.actuation)),
+            torque_noise: [0, 1].map(|motor| Noise::new(seed, TORQUE_STREAM + motor)),
+            sensors: Sensors::new(rig.sensors, seed, SENSOR_STREAM),
+        }
+    }
+
+    /// One tick: read, control, move on by 1 ms.
+    fn step(&mut self, tick: u64, program: &Program) -> BenchSample {
+        let time_s = tick as f64 / 1000.0;
+        let truth = Readings {
+            motor_angle_rad: self.shafts.each_ref().map(BenchPlant::angle_rad),
+            motor_speed_rad_s: self.shafts.each_ref().map(BenchPlant::speed_rad_s),
+            ..Readings::default()
+        };
+        let readings = self.sensors.read(&truth, tick);
+        let target_speed_rad_s = program.target_rad_s(time_s);
+        let mut torque_nm = [0.0; 2];
+        for motor in 0..2 {
+            torque_nm[motor] =
+                self.asked(motor, target_speed_rad_s, &readings, program.added_nm(motor, time_s));
+            self.advance(motor, torque_nm[motor]);
+        }
+        let mut sample = BenchSample {
+            time_s: self.sensors.stamp(tick),
+            motor_angle_rad: readings.motor_angle_rad,
+            motor_speed_rad_s: readings.motor_speed_rad_s,
+            torque_nm,
+            target_speed_rad_s,
+        };
+        if self.rig.single {
+            let once = |pair: &mut [f64; 2]| pair[1] = pair[0];
+            once(&mut sample.motor_angle_rad);
+            once(&mut sample.motor_speed_rad_s);
+            once(&mut sample.torque_nm);
+        }
+        sample
+    }
+
+    fn asked(&mut self, motor: usize, target_rad_s: f64, readings: &Readings, added_nm: f64) -> f64 {
+        let control = &self.control[motor];
+        let speed = readings.motor_speed_rad_s[motor];
+        let asked = control.step(&mut self.memory[motor], target_rad_s, speed, TICK_S);
+        let limit = control.torque_limit_nm.max(0.0);
+        if added_nm == 0.0 { asked } else { (asked + added_nm).clamp(-limit, limit) }
+    }
+
+    fn advance(&mut self, motor: usize, asked_nm: f64) {
+        let noise = self.torque_noise[motor].normal(self.rig.actuation.torque_noise_nm);
+        let speed = self.shafts[motor].speed_rad_s();
+        let torque_nm = self.actuators[motor].step(asked_nm, speed) + noise;
+        self.shafts[motor].advance(torque_nm, TICK_S, SimulationSettings::default().substeps);
+    }
+}

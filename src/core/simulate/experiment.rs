@@ -1,0 +1,436 @@
+//! One experiment from settings to outcome: the declared model makes the controller, the actual one is
+//! simulated.
+
+use std::ops::ControlFlow;
+
+use nalgebra::Matrix2x4;
+
+use super::balance_run::{Course, Run};
+use super::bench_run::{self, BenchRig, BenchRun, Program, SpeedGains};
+use super::sample::{BenchSample, Sample};
+use super::scenario::{MAX_SECONDS, Scenario};
+use super::simulation::{NotFinite, SimulationError, TICK_S};
+use crate::ParameterError;
+use crate::control::{BalanceController, ControlError, ControllerKind, DEFAULT_COMPENSATION, SpeedPi};
+use crate::friction::{Compensation, Feedforward};
+use crate::identify::Motor;
+use crate::identify::excitation::{SpeedSweep, Step};
+use crate::lqr::{self, DesignError, SampledLoop};
+use crate::model_file::{Model, Rig, RobotModel};
+use crate::parameter::{finite, not_negative, within};
+use crate::record::Log;
+
+/// Target of the speed tracking (section 4.3), rad/s.
+const TARGET_RAD_S: f64 = 5.0;
+
+/// A push on the body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Push {
+    /// Start, s.
+    pub start_s: f64,
+    /// Force, forward positive, N.
+    pub force_n: f64,
+    /// Duration, s.
+    pub duration_s: f64,
+    /// Where it acts: above the axle along the body, m; none for the centre of mass.
+    pub height_m: Option<f64>,
+}
+
+impl Push {
+    /// The paper's kick comes at 8.5 s (section 4.4); force, duration and height are not given. Assumed: 30 N
+    /// for 0.1 s at the centre of mass, which moves the robot about as far as the paper's.
+    pub const KICK: Self = Self { start_s: 8.5, force_n: 30.0, duration_s: 0.1, height_m: None };
+}
+
+/// What drives the robot in an experiment.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ControllerChoice {
+    /// State feedback; in the air PI speed control.
+    Lqr,
+    /// The same with friction fed forward.
+    Flqr,
+    /// PI speed control, for experiments in the air.
+    Pi,
+}
+
+impl ControllerChoice {
+    /// Every choice.
+    pub const ALL: [Self; 3] = [Self::Lqr, Self::Flqr, Self::Pi];
+
+    /// Name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Lqr => "lqr",
+            Self::Flqr => "flqr",
+            Self::Pi => "pi",
+        }
+    }
+}
+
+/// Settings of one run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Experiment {
+    /// What the robot is put through.
+    pub scenario: Scenario,
+    /// What drives it.
+    pub controller: ControllerChoice,
+    /// Simulated time, s, at most 3600, rounded to 1 ms.
+    pub seconds: f64,
+    /// Seed of all noise.
+    pub seed: u64,
+    /// Gains of the speed control in the air; none for the scenario's own: [`SpeedGains::PAPER`] for speed
+    /// tracking, [`SpeedGains::firm`] for the sweep, [`SpeedGains::loose`] for the multisine.
+    pub speed_gains: Option<SpeedGains>,
+    /// Target of the speed tracking, rad/s.
+    pub target_speed_rad_s: f64,
+    /// Push of the kick.
+    pub kick: Push,
+    /// K in place of the model's design.
+    pub gain: Option<Matrix2x4<f64>>,
+    /// Height of the legs of both models in place of their own, m; the gain is designed for it.
+    pub leg_height_m: Option<f64>,
+}
+
+/// Why an experiment has no outcome.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ExperimentError {
+    /// Speed control cannot balance.
+    #[error(
+        "pi controls the speed of wheels in the air and cannot balance the robot in {scenario}: use lqr or flqr, \
+         or a scenario in the air (speed-tracking, friction-sweep, multisine)"
+    )]
+    PiOnGround {
+        /// What was asked for.
+        scenario: Scenario,
+    },
+    /// A single axis that is to balance.
+    #[error(
+        "{scenario} with {} needs a robot, but {name:?} is a single axis: give a model with a [robot] table",
+        controller.name()
+    )]
+    NeedsRobot {
+        /// What was asked for.
+        scenario: Scenario,
+        /// The controller with it.
+        controller: ControllerChoice,
+        /// Name of the model.
+        name: String,
+    },
+    /// A carriage that is to turn.
+    #[error(
+        "{scenario} needs a motor shaft, but {name:?} is a linear axis: give a [robot] or an [axis] with \
+         kind = \"rotary\""
+    )]
+    NeedsShaft {
+        /// What was asked for.
+        scenario: Scenario,
+        /// Name of the model.
+        name: String,
+    },
+    /// Nothing to design with.
+    #[error(
+        "the model has no [lqr] table: add q_diagonal = [4 numbers] and r_diagonal = [2 numbers], or give a gain"
+    )]
+    NoWeights,
+    /// A design that does not exist.
+    #[error(transparent)]
+    Design(#[from] DesignError),
+    /// A controller that cannot be made.
+    #[error(transparent)]
+    Control(#[from] ControlError),
+    /// A setting out of range.
+    #[error(transparent)]
+    Parameter(#[from] ParameterError),
+    /// A robot that cannot be simulated.
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
+    /// A sweep whose dwells are too short.
+    #[error("{seconds} s are too short for 33 speeds: give at least {least} s")]
+    SweepTooShort {
+        /// Asked for, s.
+        seconds: f64,
+        /// Needed, s.
+        least: f64,
+    },
+    /// A motion that became infinite or undefined.
+    #[error("{problem}")]
+    NotFinite {
+        /// When it happened.
+        problem: NotFinite,
+        /// The run up to there.
+        kept: Box<Outcome>,
+    },
+}
+
+impl ExperimentError {
+    /// Whether scenario and controller do not go together, whatever the models.
+    pub fn is_wrong_usage(&self) -> bool {
+        matches!(self, Self::PiOnGround { .. })
+    }
+}
+
+/// What came of an experiment.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Outcome {
+    /// The robot on the ground.
+    Ground(Run),
+    /// Motors with their wheels in the air.
+    Bench(BenchRun),
+}
+
+impl Outcome {
+    /// What was recorded: a robot log, or a bench log of one motor with its measured and its target speed.
+    pub fn log(&self, motor: Motor) -> Log {
+        match self {
+            Self::Ground(run) => log_of(Sample::COLUMNS, run.samples.iter().map(Sample::to_row)),
+            Self::Bench(run) => {
+                log_of(BenchSample::COLUMNS, run.samples.iter().map(|sample| sample.to_row(motor)))
+            }
+        }
+    }
+
+    /// What was known before the run, in sentences.
+    pub fn warnings(&self) -> &[String] {
+        match self {
+            Self::Ground(run) => &run.warnings,
+            Self::Bench(run) => &run.warnings,
+        }
+    }
+
+    fn not_finite(&self) -> Option<NotFinite> {
+        match self {
+            Self::Ground(run) => run.not_finite,
+            Self::Bench(run) => run.not_finite,
+        }
+    }
+}
+
+fn log_of<const COLUMNS: usize>(
+    names: [&'static str; COLUMNS],
+    rows: impl ExactSizeIterator<Item = [f64; COLUMNS]>,
+) -> Log {
+    let mut columns = names.map(|name| (name, Vec::with_capacity(rows.len())));
+    for row in rows {
+        for (column, value) in columns.iter_mut().zip(row) {
+            column.1.push(value);
+        }
+    }
+    Log::from_columns("simulated", columns)
+}
+
+/// Runs an experiment on `actual` under the controller that `declared` makes; normally both are the same.
+/// `watch` hears the share that is done, every 10 ms of simulated time, and may stop the run, which then ends
+/// there.
+///
+/// # Errors
+/// Settings or models that do not fit the scenario, a design that does not exist, a motion that does not stay
+/// finite; what was recorded of it comes with the error.
+pub fn run(
+    experiment: &Experiment,
+    declared: &Model,
+    actual: &Model,
+    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> Result<Outcome, ExperimentError> {
+    let plan = Plan::new(experiment, declared, actual)?;
+    let warnings = plan.warnings();
+    let ticks = (experiment.seconds / TICK_S).round() as usize;
+    let outcome = match plan {
+        Plan::Ground { controller, actual, .. } => {
+            let course = Course::new(experiment.scenario, experiment.seconds, &experiment.kick);
+            Outcome::Ground(course.run(&actual, controller, experiment.seed, warnings, watch)?)
+        }
+        Plan::Bench { control, program, actual, .. } => {
+            let run = bench_run::run(&actual, &control, &program, ticks, experiment.seed, watch);
+            Outcome::Bench(BenchRun { warnings, ..run })
+        }
+    };
+    match outcome.not_finite() {
+        Some(problem) => Err(ExperimentError::NotFinite { problem, kept: Box::new(outcome) }),
+        None => Ok(outcome),
+    }
+}
+
+/// An experiment that can start.
+enum Plan {
+    Ground { controller: BalanceController, declared: Box<RobotModel>, actual: Box<RobotModel> },
+    Bench { control: [SpeedPi; 2], program: Program, gains: SpeedGains, declared: BenchRig, actual: BenchRig },
+}
+
+impl Experiment {
+    /// An experiment with the defaults of its scenario.
+    pub fn new(scenario: Scenario, controller: ControllerChoice) -> Self {
+        Self {
+            scenario,
+            controller,
+            seconds: scenario.default_seconds(),
+            seed: 1,
+            speed_gains: None,
+            target_speed_rad_s: TARGET_RAD_S,
+            kick: Push::KICK,
+            gain: None,
+            leg_height_m: None,
+        }
+    }
+
+    /// Whether the robot balances; otherwise its wheels are in the air.
+    pub fn on_ground(&self) -> bool {
+        self.scenario.on_ground()
+            && !(self.scenario == Scenario::Multisine && self.controller == ControllerChoice::Pi)
+    }
+
+    /// What is known before the run, in sentences: a gain whose loop is unstable as it runs.
+    ///
+    /// # Errors
+    /// As [`run`], except for the motion.
+    pub fn check(&self, declared: &Model, actual: &Model) -> Result<Vec<String>, ExperimentError> {
+        Ok(Plan::new(self, declared, actual)?.warnings())
+    }
+
+    fn validate(&self) -> Result<(), ExperimentError> {
+        if self.on_ground() && self.controller == ControllerChoice::Pi {
+            return Err(ExperimentError::PiOnGround { scenario: self.scenario });
+        }
+        within("seconds", self.seconds, TICK_S..=MAX_SECONDS, "from 0.001 to 3600")?;
+        within("target_speed_rad_s", self.target_speed_rad_s, -1e3..=1e3, "from -1000 to 1000")?;
+        if let Some(SpeedGains { kp, ki }) = self.speed_gains {
+            not_negative("kp", kp)?;
+            not_negative("ki", ki)?;
+        }
+        within("start_s", self.kick.start_s, 0.0..=MAX_SECONDS, "from 0 to 3600")?;
+        within("duration_s", self.kick.duration_s, 0.0..=MAX_SECONDS, "from 0 to 3600")?;
+        finite("force_n", self.kick.force_n)?;
+        Ok(finite("height_m", self.kick.height_m.unwrap_or(0.0))?)
+    }
+
+    /// The robot with its legs as asked for.
+    fn robot(&self, model: &Model) -> Result<Box<RobotModel>, ExperimentError> {
+        let Rig::Robot(robot) = &model.rig else {
+            let (scenario, controller) = (self.scenario, self.controller);
+            return Err(ExperimentError::NeedsRobot { scenario, controller, name: model.name.clone() });
+        };
+        Ok(match self.leg_height_m {
+            Some(height) => Box::new(robot.at_leg_height(height)?),
+            None => robot.clone(),
+        })
+    }
+
+    fn rig(&self, model: &Model) -> Result<BenchRig, ExperimentError> {
+        match &model.rig {
+            Rig::Robot(robot) => {
+                robot.validate()?;
+                Ok(BenchRig::of_robot(robot))
+            }
+            Rig::Axis(axis) => BenchRig::of_axis(axis).ok_or_else(|| ExperimentError::NeedsShaft {
+                scenario: self.scenario,
+                name: model.name.clone(),
+            }),
+        }
+    }
+
+    fn program(&self, declared: &BenchRig) -> Result<(Program, SpeedGains), ExperimentError> {
+        let inertia = declared.inertia_kg_m2;
+        let (program, gains) = match self.scenario {
+            Scenario::FrictionSweep => {
+                let least = SpeedSweep::least_seconds();
+                let sweep = SpeedSweep::new(self.seconds)
+                    .ok_or(ExperimentError::SweepTooShort { seconds: self.seconds, least })?;
+                (Program::Sweep(sweep), SpeedGains::firm(inertia))
+            }
+            Scenario::Multisine => (Program::multisine(declared), SpeedGains::loose(inertia)),
+            _ => {
+                let step = Step { start_s: 0.0, before: 0.0, after: self.target_speed_rad_s };
+                (Program::Step(step), SpeedGains::PAPER)
+            }
+        };
+        Ok((program, self.speed_gains.unwrap_or(gains)))
+    }
+}
+
+impl Plan {
+    fn new(experiment: &Experiment, declared: &Model, actual: &Model) -> Result<Self, ExperimentError> {
+        experiment.validate()?;
+        if experiment.on_ground() {
+            let [declared, actual] = [experiment.robot(declared)?, experiment.robot(actual)?];
+            let gain = match experiment.gain {
+                Some(gain) => gain,
+                None => {
+                    let weights = declared.weights.ok_or(ExperimentError::NoWeights)?;
+                    lqr::design(&declared.parameters.linear_model(), &weights)?.gain
+                }
+            };
+            let kind = match experiment.controller {
+                ControllerChoice::Flqr => ControllerKind::Flqr,
+                ControllerChoice::Lqr | ControllerChoice::Pi => ControllerKind::Lqr,
+            };
+            let controller = BalanceController::new(kind, &declared, gain)?;
+            return Ok(Self::Ground { controller, declared, actual });
+        }
+        let compensation = declared.robot().and_then(|robot| robot.compensation);
+        let [declared, actual] = [experiment.rig(declared)?, experiment.rig(actual)?];
+        let (program, gains) = experiment.program(&declared)?;
+        let compensated = experiment.controller == ControllerChoice::Flqr;
+        let control = speed_control(
+            &declared,
+            gains,
+            compensated.then_some(compensation.unwrap_or(DEFAULT_COMPENSATION)),
+        )?;
+        Ok(Self::Bench { control, program, gains, declared, actual })
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        let unstable = |declared: bool, actual: bool, loop_of: &str, mend: &str| match (declared, actual) {
+            (true, _) => Some(format!("{loop_of} is unstable with the model's delay: {mend}")),
+            (false, true) => Some(format!(
+                "{loop_of} is stable with the model but unstable with the robot that is simulated: {mend}"
+            )),
+            (false, false) => None,
+        };
+        match self {
+            Self::Ground { controller, declared, actual } => {
+                let fails = |robot: &RobotModel| !is_stable(robot, &controller.gain);
+                let mend = "lower the gains, or design them with other weights";
+                unstable(fails(declared), fails(actual), "the balance under this gain", mend)
+            }
+            Self::Bench { gains, declared, actual, .. } => {
+                let fails =
+                    |rig: &BenchRig| gains.phase_margin_rad(rig.inertia_kg_m2, rig.actuation.delay_s) <= 0.0;
+                unstable(fails(declared), fails(actual), "the speed control", "lower kp and ki")
+            }
+        }
+        .into_iter()
+        .collect()
+    }
+}
+
+fn speed_control(
+    rig: &BenchRig,
+    gains: SpeedGains,
+    compensation: Option<Compensation>,
+) -> Result<[SpeedPi; 2], ExperimentError> {
+    if compensation.is_some() && rig.friction.iter().all(Option::is_none) {
+        return Err(ControlError::NoFriction.into());
+    }
+    let mut control = [SpeedPi {
+        proportional_nm_s_rad: gains.kp,
+        integral_nm_rad: gains.ki,
+        feedforward: None,
+        torque_limit_nm: rig.torque_limit_nm(),
+    }; 2];
+    for (motor, curve) in control.iter_mut().zip(rig.friction) {
+        let both = curve.zip(compensation);
+        motor.feedforward = both.map(|(curve, how)| Feedforward::new(curve, how)).transpose()?;
+    }
+    Ok(control)
+}
+
+/// Whether the loop as it runs on a robot is stable: sampled, delayed, with a held IMU.
+fn is_stable(robot: &RobotModel, gain: &Matrix2x4<f64>) -> bool {
+    let timing = SampledLoop {
+        tick_s: TICK_S,
+        delay_s: robot.actuation.delay_s,
+        imu_period_s: TICK_S * f64::from(robot.sensors.imu_period_ticks()),
+        imu_latency_s: robot.sensors.imu_latency_s,
+        wheel_radius_m: robot.parameters.wheel_radius_m,
+    };
+    lqr::margins(&robot.parameters.linear_model(), gain, &timing).stable
+}
