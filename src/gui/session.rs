@@ -8,11 +8,13 @@ use flqr_core::lqr::Weights;
 use flqr_core::model_file::{AxisModel, Model, Rig, RobotModel, presets};
 use nalgebra::Matrix2x4;
 
-/// Weights and compensation of a robot whose file has none: those of the paper's preset.
+/// Weights and compensation of a robot whose file has none: those of the paper's preset, without the entry
+/// off Q's diagonal, which suits that robot alone.
 static FILLED_IN: LazyLock<(Weights, Compensation)> = LazyLock::new(|| {
     let paper = presets::paper();
     let settings = paper.robot().and_then(|robot| robot.weights.zip(robot.compensation));
-    settings.expect("a test of the core finds both in every preset")
+    let (weights, compensation) = settings.expect("a test of the core finds both in every preset");
+    (Weights::diagonal(weights.q.diagonal().into(), weights.r.diagonal().into()), compensation)
 });
 
 /// What the user edits.

@@ -65,6 +65,9 @@ impl WeightEditor {
             ui.checkbox(&mut self.full_matrices, "Full matrices")
                 .on_hover_text("Edit the entries off the diagonals too");
         });
+        if !self.full_matrices && !before.is_diagonal() {
+            hint_ui(ui, "Entries off the diagonals follow these weights: see “Full matrices”.");
+        }
         if self.full_matrices {
             matrices_ui(context, ui, &mut weights);
         }
@@ -84,7 +87,12 @@ impl WeightEditor {
             ui.end_row();
             for (index, row) in Q_ROWS.iter().enumerate() {
                 let focus = index == 0 && std::mem::take(&mut self.focus_first);
-                row_ui(context, ui, row, &mut weights.q[(index, index)], focus);
+                let before = weights.q[(index, index)];
+                let mut weight = before;
+                row_ui(context, ui, row, &mut weight, focus);
+                if weight != before {
+                    weights.set_state_weight(index, weight);
+                }
             }
             let old = [weights.r[(0, 0)], weights.r[(1, 1)]];
             for (index, row) in R_ROWS.iter().enumerate() {
