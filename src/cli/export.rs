@@ -3,12 +3,15 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use flqr_core::control::{BalanceController, ControllerKind};
+use flqr_core::control::{BalanceController, ControllerKind, GainSchedule};
 use flqr_core::export::{Controller, Format};
 use serde::Serialize;
 
 use super::output::{Failure, Output};
 use super::{gains, input};
+
+/// Heights of the legs in the exported table.
+const SCHEDULED_HEIGHTS: usize = 11;
 
 #[derive(Args)]
 pub(crate) struct Arguments {
@@ -42,7 +45,13 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         _ => ControllerKind::Flqr,
     };
     let controller = BalanceController::new(kind, &robot, design.gain).map_err(Failure::from_error)?;
-    let controller = Controller::new(&name, &controller);
+    let schedule = robot
+        .legs
+        .as_ref()
+        .map(|_| GainSchedule::design(&robot, SCHEDULED_HEIGHTS))
+        .transpose()
+        .map_err(|error| Failure::Message(format!("{}: {error}", arguments.model.display())))?;
+    let controller = Controller::new(&name, &controller, schedule.as_ref());
     let format = match arguments.to {
         Form::CHeader => Format::CHeader,
         Form::Json => Format::Json,

@@ -3,10 +3,12 @@
 mod c_header;
 mod tree;
 
+use nalgebra::Matrix2x4;
 use serde::Serialize;
 
-use crate::control::BalanceController;
+use crate::control::{BalanceController, GainSchedule, ScheduleNode};
 use crate::friction::{Compensation, Feedforward, StribeckParameters};
+use crate::robot::YawHold;
 
 /// Forms of an exported controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,7 +23,7 @@ pub enum Format {
     Csv,
 }
 
-/// Everything that the control law u = −K X + friction feedforward needs, SI units.
+/// Everything that the control law u = K (X̃ − X) + yaw hold + friction feedforward needs, SI units.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Controller {
     /// Name of the model.
@@ -30,12 +32,30 @@ pub struct Controller {
     pub state: [&'static str; 4],
     /// K of either motor, N m per unit of the state.
     pub gain: Motors<[f64; 4]>,
+    /// Gains over the legs' height; absent for a robot of one height.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub schedule: Vec<Scheduled>,
+    /// What keeps the heading: torque of one motor, opposite to the other's.
+    pub yaw_hold: YawHold,
+    /// r in x = r (q + pitch), m.
+    pub wheel_radius_m: f64,
+    /// In yaw = r (q_right − q_left) / track, m.
+    pub track_width_m: f64,
     /// Largest torque of one motor, N m; absent if unlimited.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub torque_limit_nm: Option<f64>,
     /// Friction feedforward; absent where no motor has one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub feedforward: Option<Motors<Option<FeedforwardNumbers>>>,
+}
+
+/// The gain at one height of the legs.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Scheduled {
+    /// Height, m; between heights the gain is linear, beyond them that of the end.
+    pub leg_height_m: f64,
+    /// K of either motor at that height.
+    pub gain: Motors<[f64; 4]>,
 }
 
 /// One value for each motor.
@@ -64,17 +84,28 @@ impl From<Feedforward> for FeedforwardNumbers {
     }
 }
 
+impl From<&Matrix2x4<f64>> for Motors<[f64; 4]> {
+    fn from(gain: &Matrix2x4<f64>) -> Self {
+        let row = |motor| std::array::from_fn(|state| gain[(motor, state)]);
+        Self { left: row(0), right: row(1) }
+    }
+}
+
 impl Controller {
-    /// Gathers the numbers of a controller under the name of its model.
-    pub fn new(name: &str, controller: &BalanceController) -> Self {
-        let row = |motor| std::array::from_fn(|state| controller.gain[(motor, state)]);
+    /// Gathers the numbers of a controller under the name of its model; with the schedule of a robot whose legs
+    /// have several heights.
+    pub fn new(name: &str, controller: &BalanceController, schedule: Option<&GainSchedule>) -> Self {
         let [left, right] =
             controller.feedforward.map(|feedforward| feedforward.map(FeedforwardNumbers::from));
         let limit = controller.torque_limit_nm;
         Self {
             name: name.to_owned(),
             state: ["x_m", "x_dot_m_s", "pitch_rad", "pitch_rate_rad_s"],
-            gain: Motors { left: row(0), right: row(1) },
+            gain: Motors::from(&controller.gain),
+            schedule: schedule.map_or(&[][..], GainSchedule::nodes).iter().map(scheduled).collect(),
+            yaw_hold: controller.yaw_hold,
+            wheel_radius_m: controller.odometry.wheel_radius_m,
+            track_width_m: controller.odometry.track_width_m,
             torque_limit_nm: limit.is_finite().then_some(limit),
             feedforward: (left.is_some() || right.is_some()).then_some(Motors { left, right }),
         }
@@ -89,4 +120,8 @@ impl Controller {
             Format::Csv => tree::csv(self),
         }
     }
+}
+
+fn scheduled(node: &ScheduleNode) -> Scheduled {
+    Scheduled { leg_height_m: node.leg_height_m, gain: Motors::from(&node.gain) }
 }

@@ -81,7 +81,7 @@ mod tests {
         let mut gain = nalgebra::Matrix2x4::from_element(-0.25);
         gain[(0, 1)] = 1e-9;
         let controller = BalanceController::new(ControllerKind::Flqr, model.robot().unwrap(), gain).unwrap();
-        Controller::new("a \"quoted\" name", &controller)
+        Controller::new("a \"quoted\" name", &controller, None)
     }
 
     #[test]
