@@ -199,6 +199,48 @@ fn a_log_that_cannot_be_written_leaves_nothing_behind() {
 }
 
 #[test]
+fn gains_have_the_margins_of_the_loop_as_it_runs() {
+    let gains = json(&["gains", PAPER]);
+    let margins = &gains["margins"];
+    let value = |key: &str| margins[key].as_f64().unwrap();
+    assert_eq!(margins["stable"], true);
+    assert_eq!(gains["warnings"], serde_json::json!([]));
+    assert!(value("gain_up") > 1.0 && value("gain_down") < 1.0, "{margins}");
+    // What the phase margin leaves is used up by a delay of that phase at the crossover, to the hold's share.
+    let delay_s = value("phase_rad") / value("crossover_rad_s");
+    assert!((delay_s / value("delay_s") - 1.0).abs() < 0.01, "{margins}");
+}
+
+#[test]
+fn gains_follow_the_legs() {
+    let model = "name = \"legs\"\n[robot]\nbody_mass_kg = 12.5\nwheel_mass_kg = 1.25\n\
+         wheel_inertia_kg_m2 = 0.0025\nwheel_radius_m = 0.063\nleg_height_m = 0.35\n\
+         com_height_m = { leg_height_m = [0.32, 0.42], com_height_m = [0.12, 0.19] }\n\
+         body_inertia_kg_m2 = 0.1\n[lqr]\nq_diagonal = [1.0, 0.01, 0.01, 0.001]\nr_diagonal = [1.25, 1.25]\n";
+    let legged = file("legged.toml", model);
+    let slow = file("slow.toml", &format!("{model}[actuation]\ndelay_s = 0.3\n"));
+    let schedule = json(&["gains", &legged, "--schedule", "3"])["schedule"].clone();
+    let heights: Vec<f64> =
+        schedule.as_array().unwrap().iter().map(|node| node["leg_height_m"].as_f64().unwrap()).collect();
+    assert_eq!(heights, [0.32, 0.37, 0.42]);
+    for (node, height) in schedule.as_array().unwrap().iter().zip(["0.32", "0.37", "0.42"]) {
+        let one = json(&["gains", &legged, "--leg-height", height]);
+        for (found, expected) in numbers(&node["k"]).into_iter().zip(numbers(&one["k"])) {
+            assert!((found - expected).abs() < 1e-9 * expected.abs(), "{found} for {expected}");
+        }
+        assert_eq!(node["margins"]["stable"], true);
+    }
+    assert!(refusal(&["gains", &legged, "--leg-height", "0.5"], 1).contains("leg_height_m = 0.5"));
+    assert!(refusal(&["gains", &legged, "--schedule", "1"], 1).contains("from 2 to 1000 heights"));
+    let late = json(&["gains", &slow]);
+    assert_eq!(late["margins"]["stable"], false);
+    assert!(
+        String::from_utf8(flqr(&["gains", &slow]).stderr).unwrap().starts_with("flqr: warning: the loop")
+    );
+    assert!(late["warnings"][0].as_str().unwrap().contains("delay 300 ms"), "{late}");
+}
+
+#[test]
 fn exports_carry_the_gain() {
     let gain = numbers(&json(&["gains", PAPER])["k"]);
     for form in ["c-header", "json", "yaml", "csv"] {

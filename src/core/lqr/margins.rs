@@ -3,6 +3,7 @@
 use nalgebra::{Complex, Matrix2x4};
 
 use super::sampled_loop::{ContinuousLoop, SampledSystem};
+use crate::model_file::RobotModel;
 use crate::robot::LinearModel;
 
 /// When the controller measures and acts.
@@ -45,6 +46,8 @@ pub struct Margins {
     pub gain_down_rad_s: f64,
 }
 
+/// Time from one control tick to the next, s; the paper's 1000 Hz.
+const TICK_S: f64 = 0.001;
 /// Longest delay whose eigenvalues are computed, ticks; of a longer one they would take more than a frame.
 const LONGEST_QUEUE: f64 = 64.0;
 /// IMU period and latency from which on the loop is not analysed, ticks.
@@ -97,6 +100,17 @@ pub fn margins(model: &LinearModel, gain: &Matrix2x4<f64>, timing: &SampledLoop)
 }
 
 impl SampledLoop {
+    /// The loop of a robot: control at 1 kHz, its model's delay, IMU and wheels.
+    pub fn of(robot: &RobotModel) -> Self {
+        Self {
+            tick_s: TICK_S,
+            delay_s: robot.actuation.delay_s,
+            imu_period_s: f64::from(robot.sensors.imu_period_ticks()) * TICK_S,
+            imu_latency_s: robot.sensors.imu_latency_s,
+            wheel_radius_m: robot.parameters.wheel_radius_m,
+        }
+    }
+
     fn is_within_reach(&self) -> bool {
         let ticks = |time_s: f64| time_s / self.tick_s;
         self.tick_s > 0.0
