@@ -2,8 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use flqr_core::lqr::{DesignError, LqrDesign, Weights, design};
-use flqr_core::model_file::RobotModel;
+use flqr_core::lqr::{DesignError, LqrDesign, Margins, SampledLoop, Weights, design, margins};
 use flqr_core::robot::{LinearModel, RobotParameters};
 
 use crate::session::Session;
@@ -19,12 +18,16 @@ pub(crate) struct Designed {
     pub(crate) parameters: RobotParameters,
     pub(crate) weights: Weights,
     pub(crate) design: LqrDesign,
+    /// When the robot measures and acts,
+    pub(crate) timing: SampledLoop,
+    /// and what the design bears of that.
+    pub(crate) margins: Margins,
 }
 
 /// The design in force, the last problem, and the design to compare with.
 #[derive(Default)]
 pub(crate) struct Designer {
-    tried: Option<(RobotParameters, Weights)>,
+    tried: Option<(RobotParameters, Weights, SampledLoop)>,
     /// The last design that worked; it stays in force while `problem` is set.
     pub(crate) in_force: Option<Designed>,
     /// Why the present weights and parameters give no design.
@@ -42,19 +45,19 @@ pub(crate) struct Designer {
 impl Designer {
     /// Solves anew when the input differs from the last one; says whether the gains in force changed.
     pub(crate) fn update(&mut self, session: &Session) -> bool {
-        let Some(&RobotModel { parameters, .. }) = session.robot() else {
+        let Some(robot) = session.robot() else {
             *self = Self::default();
             return false;
         };
-        let input = (parameters, session.weights());
+        let input = (robot.parameters, session.weights(), SampledLoop::of(robot));
         if self.tried == Some(input) {
             return false;
         }
         self.tried = Some(input);
-        self.solve(parameters, input.1)
+        self.solve(input)
     }
 
-    fn solve(&mut self, parameters: RobotParameters, weights: Weights) -> bool {
+    fn solve(&mut self, (parameters, weights, timing): (RobotParameters, Weights, SampledLoop)) -> bool {
         self.count += 1;
         let model = parameters.linear_model();
         let (result, solve_s) = timed(&model, &weights);
@@ -62,7 +65,8 @@ impl Designer {
         match result {
             Ok(design) => {
                 self.problem = None;
-                self.in_force = Some(Designed { parameters, weights, design });
+                let margins = margins(&model, &design.gain, &timing);
+                self.in_force = Some(Designed { parameters, weights, design, timing, margins });
                 true
             }
             Err(error) => {

@@ -636,3 +636,20 @@ fn a_hundred_frames_of_random_input_do_no_harm() {
         }
     }
 }
+
+#[test]
+fn margins_are_told_for_the_delay_that_the_model_has() {
+    let of = |delay_s: f64| {
+        let text = format!("{ROBOT}[actuation]\ndelay_s = {delay_s}\n");
+        let model = Model::from_toml(&text, "test.toml").unwrap();
+        open(WindowOptions { model, ..options(Tab::Tune) }, SIZE)
+    };
+    // 6.43, 0.461 and 45.3 ms by scipy's eigenvalues over one IMU period, brought to 0 by bisection.
+    let window = of(0.004);
+    for text in ["gain margin", "×0.46…6.43", "+45.3 ms"] {
+        assert!(window.query_by_label(text).is_some(), "{text}");
+    }
+    let window = of(0.06);
+    assert!(window.query_by_label("gain margin").is_none());
+    assert!(window.query_by_label_contains("Unstable as it runs (1 kHz, 60 ms of delay").is_some());
+}

@@ -8,7 +8,7 @@ use crate::command::Command;
 use crate::context::ViewContext;
 use crate::design::Designed;
 use crate::theme::palette;
-use crate::widgets::{choice_ui, error_ui, hint_ui, mono, number_ui, section_ui, shown, warning_ui};
+use crate::widgets::{choice_ui, error_ui, hint_ui, mono, number_ui, plain, section_ui, shown, warning_ui};
 
 /// Gains of the states, with their units.
 const COLUMNS: [(&str, &str); 4] = [
@@ -31,6 +31,7 @@ pub(super) fn ui(context: &ViewContext<'_>, ui: &mut Ui) {
     let Some(designed) = &designer.in_force else { return };
     gain_table_ui(context, ui, designed);
     poles_ui(ui, &designed.design);
+    margins_ui(ui, designed);
     ui.horizontal(|ui| {
         hint_ui(ui, format!("Riccati residual {}", shown(designed.design.riccati_residual, 2)))
             .on_hover_text(
@@ -95,6 +96,58 @@ fn poles_ui(ui: &mut Ui, design: &LqrDesign) {
         hint_ui(ui, "poles, 1/s").on_hover_text("Of the closed loop A − BK, without delay and friction");
         for text in pole_texts(design) {
             ui.label(mono(text));
+        }
+    });
+}
+
+/// What the loop bears as it runs: red where that is nothing, or less than the delay it has.
+fn margins_ui(ui: &mut Ui, designed: &Designed) {
+    let Designed { timing, margins, .. } = designed;
+    let runs = format!(
+        "1 kHz, {} ms of delay, IMU at {} Hz",
+        plain(1e3 * timing.delay_s, 3),
+        plain(1.0 / timing.imu_period_s, 3)
+    );
+    if !margins.stable {
+        error_ui(
+            ui,
+            format!("Unstable as it runs ({runs}): less weight on the states, or more on the torques."),
+        );
+        return;
+    }
+    let error = palette(ui.visuals()).error;
+    let tight = margins.delay_s < timing.delay_s;
+    let up = if margins.gain_up.is_finite() { shown(margins.gain_up, 3) } else { "∞".to_owned() };
+    let columns = [
+        (
+            "gain margin",
+            format!("×{}…{up}", shown(margins.gain_down, 2)),
+            "Factors on all gains, down and up",
+        ),
+        (
+            "phase",
+            format!("{}°", shown(margins.phase_rad.to_degrees(), 3)),
+            "Lag or lead between command and torque",
+        ),
+        (
+            "delay",
+            format!("+{} ms", shown(1e3 * margins.delay_s, 3)),
+            "On top of the loop's own; red where that is less than it has",
+        ),
+        (
+            "crossover",
+            format!("{} rad/s", shown(margins.crossover_rad_s, 3)),
+            "Where the loop's gain passes 1",
+        ),
+    ];
+    Grid::new("margins").num_columns(4).spacing([14.0, 3.0]).show(ui, |ui| {
+        for (name, _, help) in &columns {
+            hint_ui(ui, *name).on_hover_text(format!("{help}; the loop as it runs: {runs}"));
+        }
+        ui.end_row();
+        for (name, value, _) in columns {
+            let text = mono(value);
+            ui.label(if tight && name == "delay" { text.color(error) } else { text });
         }
     });
 }
