@@ -28,7 +28,7 @@ pub use bench_plant::BenchPlant;
 pub use bench_run::{BenchRun, SpeedGains};
 pub use experiment::{ControllerChoice, Experiment, ExperimentError, Outcome, Push, run};
 pub use ground::Ground;
-pub use planar::{Forcing, PlanarPlant, advance_batch};
+pub use planar::{Forcing, PlanarPlant, Trial, TrialOutcome, advance_batch, monte_carlo};
 pub use plant::{Plant, Pose};
 pub use response::predicted_response;
 pub use sample::{BenchSample, Sample};

@@ -6,11 +6,11 @@ use super::sample::Sample;
 use super::simulation::FALL_PITCH_RAD;
 
 /// Start of the statistics: by then the robot has stood up and a kick has died away, s.
-const STATISTICS_FROM_S: f64 = 15.0;
+pub(super) const STATISTICS_FROM_S: f64 = 15.0;
 /// Length of the end of a run that decides whether it has settled, s.
-const SETTLED_WINDOW_S: f64 = 10.0;
+pub(super) const SETTLED_WINDOW_S: f64 = 10.0;
 /// Peak to peak of x within that end below which it has, m.
-const SETTLED_RANGE_M: f64 = 0.05;
+pub(super) const SETTLED_RANGE_M: f64 = 0.05;
 
 /// Extremes, mean and standard deviation (over all samples, not an estimate for more) of one quantity,
 /// in its unit.

@@ -15,6 +15,7 @@
 
 use std::ops::RangeInclusive;
 
+use super::super::change::first_below_zero;
 use super::laws::{Laws, Loads, Motion, runge_kutta};
 use super::near_angle::NearAngle;
 use super::sliding::SlidingFriction;
@@ -23,8 +24,6 @@ use crate::robot::{RobotParameters, State};
 
 /// Changes of phase within one substep after which the shafts are taken as stuck for the rest of it.
 const MAX_CHANGES: usize = 8;
-/// Share of a substep to which the instant of a change of phase is located.
-const INSTANT_TOLERANCE: f64 = 1e-9;
 
 /// What acts on the robot, constant during a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -206,31 +205,13 @@ impl PlanarPlant {
         }
     }
 
-    /// Share of the step `dt` at which the phase has just ended: between 0, where it holds, and 1, where
-    /// it does not (`end`), by secants with a bisection after each that was slow.
+    /// Share of the step `dt` at which the phase has just ended, for a step at the end of which it has (`end`).
+    #[cold]
     #[inline(never)]
     fn locate_change(&self, loads: &Loads, dt: f64, end: &Motion) -> f64 {
-        let mut holds = (0.0, self.margin(loads, &self.motion));
-        let mut ended = (1.0, self.margin(loads, end));
-        let mut bisect = false;
-        while ended.0 - holds.0 > INSTANT_TOLERANCE {
-            let width = ended.0 - holds.0;
-            let share = if bisect {
-                holds.0 + 0.5 * width
-            } else {
-                // A little beyond the secant, so that both ends close in.
-                let secant = holds.0 + width * holds.1 / (holds.1 - ended.1);
-                (secant + 0.4 * INSTANT_TOLERANCE).clamp(holds.0, ended.0)
-            };
-            let margin = self.margin(loads, &self.runge_kutta(loads, dt * share, NearAngle::sin_cos));
-            if margin >= 0.0 {
-                holds = (share, margin);
-            } else {
-                ended = (share, margin);
-            }
-            bisect = ended.0 - holds.0 > 0.5 * width;
-        }
-        ended.0
+        let margin_at =
+            |share: f64| self.margin(loads, &self.runge_kutta(loads, dt * share, NearAngle::sin_cos));
+        first_below_zero(self.margin(loads, &self.motion), self.margin(loads, end), margin_at)
     }
 
     /// Inlined into one loop-free step for each phase, which makes a step twice as fast.

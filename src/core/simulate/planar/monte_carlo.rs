@@ -1,0 +1,144 @@
+//! Many closed loops at once: thresholds from clean runs, robustness over the parameters' tolerances.
+
+use std::num::NonZeroUsize;
+
+use super::super::actuator::Actuator;
+use super::super::noise::Noise;
+use super::super::simulation::{FALL_PITCH_RAD, Fall, TICK_S};
+use super::super::statistics::Statistics;
+use super::batch::advance_batch;
+use super::plant::{Forcing, PlanarPlant};
+use super::running::RunningStatistics;
+use crate::ParameterError;
+use crate::control::{BalanceController, Measurement, Reference};
+use crate::model_file::RobotModel;
+use crate::parallel;
+use crate::parameter::within;
+use crate::robot::State;
+
+/// Robots that are simulated side by side: so many that few are left over when vectors are filled, so few that
+/// their friction tables stay close to the processor.
+const SIDE_BY_SIDE: usize = 64;
+/// Integration steps a tick.
+const SUBSTEPS: u32 = 10;
+/// Longest run, s.
+const MAX_SECONDS: f64 = 3600.0;
+
+/// One robot under control, in its plane: heading, ground, legs and sensors take no part.
+#[derive(Clone, Debug)]
+pub struct Trial {
+    /// The robot that moves: its parameters, friction, motors' limits, transport delay and torque noise count.
+    pub robot: RobotModel,
+    /// The controller, which answers the true state every 1 ms. It need not know the robot's parameters well.
+    pub controller: BalanceController,
+    /// State at the start; the controller leads it to zero.
+    pub initial: State,
+    /// Seed of the torque noise.
+    pub seed: u64,
+}
+
+/// What came of a trial.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrialOutcome {
+    /// Statistics of the true state at every tick of 1 ms.
+    pub statistics: Statistics,
+    /// The fall that ended the motion, if there was one.
+    pub fall: Option<Fall>,
+}
+
+/// Runs every trial for `seconds` (0.001 to 3600, rounded to 1 ms) with ten integration steps of order 4 a
+/// tick; the outcomes are in the order of the trials. A trial's outcome depends on nothing but the trial:
+/// neither on the others nor on the number of threads or the width of the processor's vectors.
+///
+/// # Errors
+/// Duration or a robot's parameters out of range.
+pub fn monte_carlo(
+    trials: &[Trial],
+    seconds: f64,
+    threads: NonZeroUsize,
+) -> Result<Vec<TrialOutcome>, ParameterError> {
+    within("seconds", seconds, TICK_S..=MAX_SECONDS, "from 0.001 to 3600")?;
+    for trial in trials {
+        trial.robot.parameters.validate()?;
+    }
+    let ticks = (seconds / TICK_S).round() as u64;
+    let groups: Vec<&[Trial]> = trials.chunks(SIDE_BY_SIDE).collect();
+    Ok(parallel::map(&groups, threads, |group| run(group, ticks)).concat())
+}
+
+fn run(trials: &[Trial], ticks: u64) -> Vec<TrialOutcome> {
+    let mut loops: Vec<Loop> =
+        trials.iter().enumerate().map(|(index, trial)| Loop::new(index, trial, ticks)).collect();
+    let mut plants: Vec<PlanarPlant> = trials
+        .iter()
+        .map(|trial| PlanarPlant::new(&trial.robot.parameters, trial.robot.friction, &trial.initial))
+        .collect();
+    let mut forcings = vec![Forcing::default(); trials.len()];
+    let mut outcomes = vec![None; trials.len()];
+    for tick in 0..ticks {
+        for ((closed, plant), forcing) in loops.iter_mut().zip(&plants).zip(&mut forcings) {
+            forcing.torque_nm = closed.torque_nm(plant);
+        }
+        advance_batch(&mut plants, &forcings, TICK_S, SUBSTEPS);
+        // From the end, so that the one that takes the place of a fallen robot has been looked at.
+        for place in (0..plants.len()).rev() {
+            let state = plants[place].state();
+            let up = state.pitch_rad.abs() <= FALL_PITCH_RAD;
+            if !up {
+                let fall = Fall { time_s: (tick + 1) as f64 / 1000.0, state };
+                let fallen = loops.swap_remove(place);
+                outcomes[fallen.index] = Some(fallen.outcome(Some(fall)));
+                plants.swap_remove(place);
+                forcings.swap_remove(place);
+            }
+        }
+    }
+    for standing in loops {
+        outcomes[standing.index] = Some(standing.outcome(None));
+    }
+    outcomes.into_iter().map(|outcome| outcome.expect("each trial stands or has fallen")).collect()
+}
+
+/// One robot's loop without its plant.
+struct Loop {
+    index: usize,
+    controller: BalanceController,
+    actuators: [Actuator; 2],
+    noise: [Noise; 2],
+    torque_noise_nm: f64,
+    statistics: RunningStatistics,
+}
+
+impl Loop {
+    fn new(index: usize, trial: &Trial, ticks: u64) -> Self {
+        let RobotModel { limits, actuation, .. } = &trial.robot;
+        Self {
+            index,
+            controller: trial.controller,
+            actuators: [0, 1].map(|_| Actuator::new(limits, actuation)),
+            noise: [0, 1].map(|motor| Noise::new(trial.seed, motor)),
+            torque_noise_nm: actuation.torque_noise_nm,
+            statistics: RunningStatistics::new(ticks),
+        }
+    }
+
+    /// One tick of controller and motors.
+    fn torque_nm(&mut self, plant: &PlanarPlant) -> [f64; 2] {
+        let state = plant.state();
+        self.statistics.push(&state);
+        let speed = plant.motor_speed_rad_s();
+        let measurement = Measurement { state, motor_speed_rad_s: [speed; 2], ..Measurement::default() };
+        let asked = self.controller.step(&measurement, &Reference::default());
+        std::array::from_fn(|motor| {
+            let noise = self.noise[motor].normal(self.torque_noise_nm);
+            self.actuators[motor].step(asked[motor], speed) + noise
+        })
+    }
+
+    fn outcome(&self, fall: Option<Fall>) -> TrialOutcome {
+        TrialOutcome { statistics: self.statistics.finish(fall.is_some()), fall }
+    }
+}
+
+#[cfg(test)]
+mod tests;
