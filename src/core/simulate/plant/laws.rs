@@ -230,6 +230,7 @@ impl Laws {
         (sin * c - cos * s, cos * c + sin * s)
     }
 
+    #[inline(always)]
     fn place(&self, at: &Motion, lean: (f64, f64), yaw: (f64, f64)) -> Place {
         Place { distance: self.distances(at), wheel_speed: self.wheel_speeds(at), lean, yaw }
     }

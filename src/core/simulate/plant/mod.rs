@@ -143,11 +143,11 @@ impl Plant {
     fn substeps<const UNEVEN: bool>(&mut self, loads: &Loads, step: f64, substeps: u32) {
         for _ in 0..substeps {
             let next = if self.phases.contains(&Phase::Stuck) {
-                self.step(loads, step)
+                runge_kutta(&self.motion, step, &InPhases::<UNEVEN> { plant: self, loads })
             } else {
                 runge_kutta(&self.motion, step, &Turning::<UNEVEN> { plant: self, loads })
             };
-            let end = self.worst_margin(loads, &next);
+            let end = self.worst_margin::<UNEVEN>(loads, &next);
             if ended(end) {
                 self.change(loads, step, end);
             } else {
@@ -162,15 +162,15 @@ impl Plant {
     fn change(&mut self, loads: &Loads, step: f64, mut end: f64) {
         let mut left = step;
         for _ in 0..MAX_CHANGES {
-            let start = self.worst_margin(loads, &self.motion).max(0.0);
-            let margin_at = |share| self.worst_margin(loads, &self.step(loads, left * share));
+            let start = self.worst_margin::<true>(loads, &self.motion).max(0.0);
+            let margin_at = |share| self.worst_margin::<true>(loads, &self.step(loads, left * share));
             let share = first_below_zero(start, end, margin_at);
             self.motion = self.step(loads, left * share);
             left *= 1.0 - share;
             self.stop(loads);
             self.release(loads);
             let next = self.step(loads, left);
-            end = self.worst_margin(loads, &next);
+            end = self.worst_margin::<true>(loads, &next);
             if !ended(end) {
                 self.motion = next;
                 return;
@@ -182,21 +182,21 @@ impl Plant {
     }
 
     #[inline(always)]
-    fn margins(&self, loads: &Loads, motion: &Motion) -> [f64; 2] {
-        let response = || self.laws.response::<true>(loads, motion);
+    fn margins<const UNEVEN: bool>(&self, loads: &Loads, motion: &Motion) -> [f64; 2] {
+        let response = || self.laws.response::<UNEVEN>(loads, motion);
         margins(&self.shafts, self.phases, loads.torque_nm, motion.speed, response)
     }
 
     #[inline(always)]
-    fn worst_margin(&self, loads: &Loads, motion: &Motion) -> f64 {
-        let [left, right] = self.margins(loads, motion);
+    fn worst_margin<const UNEVEN: bool>(&self, loads: &Loads, motion: &Motion) -> f64 {
+        let [left, right] = self.margins::<UNEVEN>(loads, motion);
         // Unlike min(), keeps a margin that is not a number.
         if left < right || left.is_nan() { left } else { right }
     }
 
     /// Ends the sliding of shafts that have come to rest or beyond.
     fn stop(&mut self, loads: &Loads) {
-        let margins = self.margins(loads, &self.motion);
+        let margins = self.margins::<true>(loads, &self.motion);
         for (i, margin) in margins.into_iter().enumerate() {
             if margin < 0.0 && self.phases[i] != Phase::Stuck {
                 self.motion.speed[i] = 0.0;
@@ -210,7 +210,7 @@ impl Plant {
         if !self.phases.contains(&Phase::Stuck) {
             return;
         }
-        let margin = self.worst_margin(loads, &self.motion);
+        let margin = self.worst_margin::<true>(loads, &self.motion);
         if margin.is_nan() {
             // Nothing holds what is not a number; it shows in the speed.
             self.phases = [Phase::Free; 2];
@@ -231,20 +231,22 @@ impl Plant {
 
     /// The next motion in the present phases, whichever they are.
     fn step(&self, loads: &Loads, dt: f64) -> Motion {
-        runge_kutta(&self.motion, dt, &InPhases { plant: self, loads })
+        runge_kutta(&self.motion, dt, &InPhases::<true> { plant: self, loads })
     }
 }
 
-/// Motion in the present phases, whichever they are.
-struct InPhases<'a> {
+/// Motion in the present phases, whichever they are; on level ground the ground need not be asked (not
+/// `UNEVEN`).
+struct InPhases<'a, const UNEVEN: bool> {
     plant: &'a Plant,
     loads: &'a Loads,
 }
 
-impl Smooth for InPhases<'_> {
+impl<const UNEVEN: bool> Smooth for InPhases<'_, UNEVEN> {
+    #[inline(always)]
     fn rate(&self, at: &Motion) -> Motion {
         let Self { plant, loads } = *self;
-        let response = plant.laws.response::<true>(loads, at);
+        let response = plant.laws.response::<UNEVEN>(loads, at);
         let shaft_nm = shaft_torques(&plant.shafts, plant.phases, loads.torque_nm, at.speed, &response);
         let mut rate = at.rate(&response, shaft_nm);
         for (acceleration, phase) in rate.speed.iter_mut().zip(plant.phases) {
@@ -257,7 +259,7 @@ impl Smooth for InPhases<'_> {
     }
 }
 
-/// The same where no shaft is held, and on level ground unless `UNEVEN`.
+/// The same where no shaft is held.
 struct Turning<'a, const UNEVEN: bool> {
     plant: &'a Plant,
     loads: &'a Loads,

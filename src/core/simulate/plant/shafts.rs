@@ -63,6 +63,7 @@ impl Shaft {
 
 /// Torques on both shafts after friction, N m: the motors' less friction where a shaft turns, and what
 /// keeps q̈ = 0 where it is held.
+#[inline(always)]
 pub(super) fn shaft_torques(
     shafts: &[Shaft; 2],
     phases: Phases,
@@ -70,13 +71,12 @@ pub(super) fn shaft_torques(
     speed: [f64; 2],
     response: &Response,
 ) -> [f64; 2] {
-    let turning = turning_torques(shafts, phases, torque_nm, speed);
-    match (phases[0] == Phase::Stuck, phases[1] == Phase::Stuck) {
-        (false, false) => turning,
-        (true, true) => response.holding_both(),
-        (true, false) => [response.holding_one(0, turning[1]), turning[1]],
-        (false, true) => [turning[0], response.holding_one(1, turning[0])],
+    let stuck = phases.map(|phase| phase == Phase::Stuck);
+    if stuck == [true; 2] {
+        return response.holding_both();
     }
+    let turning = turning_torques(shafts, phases, torque_nm, speed);
+    [0, 1].map(|i: usize| if stuck[i] { response.holding_one(i, turning[1 - i]) } else { turning[i] })
 }
 
 /// The same where both shafts turn.

@@ -80,6 +80,7 @@ impl Terrain {
         [0, 1].map(|i| self.paths[i].piece_at(distance[i]))
     }
 
+    #[inline(always)]
     fn roll(&self, under: &[Under; 2]) -> (f64, f64) {
         let sin = ((under[1].height - under[0].height) / self.track_m).clamp(-FARTHEST_ROLL, FARTHEST_ROLL);
         (sin, (1.0 - sin * sin).sqrt())
