@@ -40,4 +40,8 @@ pub use statistics::{Statistics, Summary};
 pub use tracking::StepResponse;
 
 #[cfg(test)]
+mod bench_tests;
+#[cfg(test)]
+mod experiment_tests;
+#[cfg(test)]
 mod tests;

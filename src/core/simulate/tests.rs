@@ -210,8 +210,8 @@ fn a_robot_without_control_falls_and_stays_down_with_its_clock() {
 #[test]
 fn a_gain_that_cannot_balance_is_told_before_the_run_that_falls_and_ends_there() {
     let design = gain(&paper());
-    // None at all, the wrong sign, and so much that 4 ms of delay are too many.
-    for gain in [Matrix2x4::zeros(), -design, 40.0 * design] {
+    // None at all, and the wrong sign.
+    for gain in [Matrix2x4::zeros(), -design] {
         let experiment =
             Experiment { gain: Some(gain), ..Experiment::new(Scenario::Flat, ControllerChoice::Lqr) };
         let told = experiment.check(&presets::paper(), &presets::paper()).unwrap();
