@@ -319,6 +319,7 @@ imu_rate_hz = 200.0
 slope_rad = 0.05
 tether = { stiffness_n_m = 12.0, anchor_m = -0.05 }
 payload = { mass_kg = 1.0, height_m = 0.2 }
+ground = [{}, { points_m = [[0.5, 0.0], [0.8, 0.03]] }]
 "#;
 
     #[test]

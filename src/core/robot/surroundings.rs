@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::parameter::{ParameterError, finite, not_negative, within};
+use crate::simulate::Ground;
 
 /// Keys of the model file's `[surroundings]` table: level ground and nothing else where it is missing. The
 /// controller's design knows nothing of them.
@@ -17,6 +18,14 @@ pub struct Surroundings {
     /// A load on the body.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub payload: Option<Payload>,
+    /// Ground under the left and the right wheel, on top of the slope, where the experiment does not bring
+    /// its own.
+    #[serde(skip_serializing_if = "is_flat")]
+    pub ground: [Ground; 2],
+}
+
+fn is_flat(ground: &[Ground; 2]) -> bool {
+    ground.iter().all(Ground::is_flat)
 }
 
 /// A spring between the robot and a fixed point; it pulls and never pushes.
@@ -51,7 +60,7 @@ pub struct Payload {
 
 impl Surroundings {
     /// Refuses slopes of more than 0.5 rad, masses and stiffnesses below zero, and lengths that are not
-    /// finite.
+    /// finite, and grounds that no wheel can roll over.
     pub fn validate(&self) -> Result<(), ParameterError> {
         within("slope_rad", self.slope_rad, -0.5..=0.5, "from -0.5 to 0.5")?;
         if let Some(tether) = &self.tether {
@@ -65,6 +74,6 @@ impl Surroundings {
             finite("height_m", payload.height_m)?;
             finite("forward_m", payload.forward_m)?;
         }
-        Ok(())
+        self.ground.iter().try_for_each(Ground::validate)
     }
 }

@@ -113,7 +113,7 @@ impl Laws {
         parameters: &RobotParameters,
         chassis: &Chassis,
         surroundings: &Surroundings,
-        grounds: &[Ground; 2],
+        grounds: [&Ground; 2],
     ) -> Self {
         let RobotParameters {
             wheel_mass_kg: wheel,
@@ -130,7 +130,7 @@ impl Laws {
         let pitching = body.pitch_inertia_kg_m2 + second_moment;
         let half_track = 0.5 * track_m;
         let slope = libm::sincos(surroundings.slope_rad);
-        let even = slope.0 == 0.0 && grounds.iter().all(Ground::is_flat);
+        let even = slope.0 == 0.0 && grounds.iter().all(|ground| ground.is_flat());
         Self {
             radius_m: radius,
             per_radius: 1.0 / radius,

@@ -85,8 +85,10 @@ impl Plant {
     }
 
     /// The same with a ground of its own under the left and the right wheel, on top of the surroundings'
-    /// slope.
+    /// slope; one that is flat leaves the surroundings' ground.
     pub fn on_ground(robot: &RobotModel, grounds: &[Ground; 2], start: &State) -> Self {
+        let own = &robot.surroundings.ground;
+        let grounds = [0, 1].map(|i: usize| if grounds[i].is_flat() { &own[i] } else { &grounds[i] });
         let laws = Laws::new(&robot.parameters, &robot.chassis, &robot.surroundings, grounds);
         let shafts = robot.friction.map(Shaft::new);
         let motion = laws.motion(start);

@@ -50,7 +50,7 @@ pub(super) struct Footing {
 impl Terrain {
     /// `slope` as sine and cosine.
     pub(super) fn new(
-        grounds: &[Ground; 2],
+        grounds: [&Ground; 2],
         slope: (f64, f64),
         track_m: f64,
         body: &Body,
@@ -60,7 +60,7 @@ impl Terrain {
         let (sin, cos) = slope;
         let lever = body.mass_kg * body.com_distance_m * gravity;
         Self {
-            paths: [Path::new(&grounds[0]), Path::new(&grounds[1])],
+            paths: grounds.map(Path::new),
             slope,
             track_m,
             wheel_weight_n: wheel_mass_kg * gravity * cos,

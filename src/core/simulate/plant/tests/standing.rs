@@ -82,3 +82,12 @@ fn tether_pulls_towards_its_anchor_beyond_its_slack() {
         assert!((plant.state().x_dot_m_s - expected).abs() < 1e-6 * expected.abs() + 1e-15, "{x_m} m");
     }
 }
+
+#[test]
+fn model_brings_its_ground_along() {
+    let robot = surrounded(Surroundings { ground: single_sided(), ..Surroundings::default() });
+    let start = State { x_m: 0.6, ..State::default() };
+    let pose = Plant::new(&robot, &start).pose();
+    assert_eq!(pose, Plant::on_ground(&RobotModel::new(ROBOT), &single_sided(), &start).pose());
+    assert!((pose.ground_height_m[1] - 0.04).abs() < 1e-15);
+}
