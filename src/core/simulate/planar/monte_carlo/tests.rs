@@ -3,13 +3,22 @@ use crate::control::ControllerKind;
 use crate::friction::{Stribeck, StribeckParameters};
 use crate::lqr;
 use crate::model_file::presets;
+use crate::robot::{Actuation, MotorLimits};
 
 const ONE_THREAD: NonZeroUsize = NonZeroUsize::MIN;
 
 /// Robots about the paper's, under controllers that were made for the paper's; every third is FLQR, and
 /// robot 5 starts too far over to be caught.
 fn trials(count: usize) -> Vec<Trial> {
-    let paper = presets::paper().robot().unwrap().clone();
+    let mut paper = presets::paper().robot().unwrap().clone();
+    // Motors that only delay and ripple, whatever the preset says.
+    paper.actuation = Actuation { delay_s: 0.004, torque_noise_nm: 0.02, torque_step_nm: 0.0 };
+    paper.limits = MotorLimits {
+        torque_nm: Some(2.42),
+        torque_slew_nm_s: None,
+        rated_speed_rad_s: None,
+        no_load_speed_rad_s: None,
+    };
     let gain = lqr::design(&paper.parameters.linear_model(), &paper.weights.unwrap()).unwrap().gain;
     let trial = |index: usize| {
         let part = |period: usize| (index % period) as f64 / period as f64 - 0.5;
@@ -72,8 +81,6 @@ fn each_trial_is_the_loop_of_one_plant() {
         states.iter().for_each(|state| running.push(state));
         assert_eq!(outcome.statistics, running.finish(fall.is_some()), "trial {index}");
     }
-    // Friction feedforward is what makes the difference after the first second or two.
-    assert_ne!(outcomes[0], outcomes[1]);
 }
 
 #[test]
