@@ -187,6 +187,166 @@ fn a_simulated_run_is_a_robot_log() {
     assert_eq!(text.lines().count(), 2001);
 }
 
+/// A model file: the paper's preset with some of its text replaced.
+fn paper_with(name: &str, changes: &[(&str, &str)]) -> String {
+    let mut text = std::fs::read_to_string(PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(PAPER)).unwrap();
+    for (old, new) in changes {
+        assert!(text.contains(old), "{old}");
+        text = text.replace(old, new);
+    }
+    file(name, &text)
+}
+
+#[test]
+fn every_scenario_runs_and_has_its_keys() {
+    for (scenario, controller, seconds) in [
+        ("flat", "lqr", "1"),
+        ("bridge", "flqr", "12"),
+        ("kick", "flqr", "1"),
+        ("cruise", "lqr", "1"),
+        ("station", "flqr", "1"),
+        ("multisine", "flqr", "1"),
+        ("multisine", "pi", "1"),
+        ("speed-tracking", "pi", "1"),
+        ("friction-sweep", "lqr", "30"),
+    ] {
+        let path = file(&format!("{scenario}_{controller}.csv"), "");
+        let run = json(&[
+            "simulate",
+            PAPER,
+            "--scenario",
+            scenario,
+            "--controller",
+            controller,
+            "--seconds",
+            seconds,
+            "--log",
+            &path,
+        ]);
+        let in_the_air = controller == "pi" || scenario == "friction-sweep";
+        let quantities: &[&str] =
+            if in_the_air { &["motor_speed_rad_s", "torque_nm"] } else { &["x_m", "x_dot_m_s", "pitch_rad"] };
+        for quantity in quantities {
+            for key in ["min", "max", "mean", "std"] {
+                assert!(run["statistics"][quantity][key].is_f64(), "{scenario} {controller}: {run}");
+            }
+        }
+        assert_eq!(run["fell"], false);
+        assert_eq!(run["settled"].is_null(), in_the_air);
+        assert_eq!(run["warnings"], Value::Array(vec![]));
+        assert_eq!(run.get("tracking").is_some(), scenario == "speed-tracking");
+        assert_eq!(
+            run.get("target_x_m").and_then(Value::as_f64),
+            match (in_the_air, scenario) {
+                (true, _) => None,
+                (false, "bridge") => Some(1.0),
+                (false, _) => Some(0.0),
+            }
+        );
+        let text = std::fs::read_to_string(&path).unwrap();
+        let expected = if in_the_air {
+            "time_s,motor_angle_rad,torque_nm,motor_speed_rad_s,target_speed_rad_s"
+        } else {
+            "time_s,x_m,x_dot_m_s,pitch_rad,pitch_rate_rad_s,motor_angle_left_rad"
+        };
+        assert!(text.starts_with(expected), "{scenario} {controller}");
+        assert_eq!(text.lines().count(), 1 + 1000 * seconds.parse::<usize>().unwrap());
+    }
+}
+
+#[test]
+fn a_sweep_of_either_motor_fits_to_its_curve() {
+    for (motor, key, value) in [("left", "static_nm", 0.0761), ("right", "static_nm", 0.0617)] {
+        let path = file(&format!("sweep_{motor}.csv"), "");
+        let arguments = ["simulate", PAPER, "--scenario", "friction-sweep", "--controller", "pi"];
+        json(
+            &[&arguments[..], &["--seed", "5", "--motor", motor, "--seconds", "60", "--log", &path]].concat(),
+        );
+        let fit = json(&["fit", &path]);
+        assert_eq!(fit["pairs"].as_array().unwrap().len(), 264);
+        let bounds = numbers(&fit["parameters"][key]["ci95"]);
+        assert!(bounds[0] < value && value < bounds[1], "{motor}: {}", fit["parameters"]);
+    }
+}
+
+#[test]
+fn tracking_gains_are_the_users() {
+    let rise = |kp: &str, ki: &str| {
+        let arguments = ["simulate", PAPER, "--scenario", "speed-tracking", "--controller", "pi"];
+        let run = json(&[&arguments[..], &["--seconds", "20", "--kp", kp, "--ki", ki]].concat());
+        ["left", "right"].map(|motor| run["tracking"][motor]["rise_time_s"].as_f64().unwrap())
+    };
+    let (fast, slow) = (rise("0.1", "0.05"), rise("0.05", "0.01"));
+    assert!(fast[0] < slow[0] && fast[1] < slow[1], "{fast:?} {slow:?}");
+}
+
+#[test]
+fn a_robot_that_falls_is_told_with_time_and_state_and_its_log_ends_there() {
+    let path = file("fall.csv", "");
+    let output = flqr(&["simulate", PAPER, "--gain", "0,0,0,0", "--log", &path, "--json"]);
+    assert_eq!(output.status.code(), Some(0));
+    let run: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(run["warnings"][0].as_str().unwrap().contains("unstable"), "{run}");
+    assert!(message.lines().next().unwrap().contains("unstable"), "told after the run: {message}");
+    assert_eq!((&run["fell"], &run["settled"]), (&Value::Bool(true), &Value::Bool(false)));
+    let time_s = run["fall"]["time_s"].as_f64().unwrap();
+    assert!(run["fall"]["state"]["pitch_rad"].as_f64().unwrap().abs() > 0.8);
+    assert!(message.contains(&format!("fell at {time_s:.3} s")), "{message}");
+    let rows = std::fs::read_to_string(&path).unwrap().lines().count() - 1;
+    assert_eq!(rows, (1000.0 * time_s).round() as usize);
+}
+
+#[test]
+fn another_robot_than_the_model_can_be_simulated() {
+    let slope = paper_with("slope.toml", &[("[limits]", "[surroundings]\nslope_rad = 0.03\n[limits]")]);
+    let lean = |arguments: &[&str]| {
+        let run =
+            json(&[&["simulate", PAPER, "--scenario", "station", "--seconds", "30"], arguments].concat());
+        run["statistics"]["pitch_rad"]["mean"].as_f64().unwrap()
+    };
+    // Uphill it leans forward, by (13 + 2) kg · sin(0.03) · 0.055 m / (13 kg · 0.16 m).
+    let leans = lean(&["--robot", &slope]) - lean(&[]);
+    assert!((leans - 0.0119).abs() < 0.003, "{leans} rad");
+    let high = lean(&["--leg-height", "0.42"]);
+    assert!(high.abs() < 0.01 && high != lean(&[]), "{high} rad");
+    let rigid = file("rigid.toml", "name = \"a\"\n[axis]\nkind = \"rotary\"\ninertia_kg_m2 = 0.01\n");
+    assert!(refusal(&["simulate", PAPER, "--robot", &rigid], 1).contains("[robot]"));
+    assert!(refusal(&["simulate", PAPER, "--robot", "none.toml"], 1).contains("none.toml"));
+}
+
+#[test]
+fn one_shaft_is_swept_whatever_the_motor() {
+    let axis = "name = \"spindle\"\n[axis]\nkind = \"rotary\"\ninertia_kg_m2 = 0.01\n[friction]\ncoulomb_nm = 0.1\n\
+                viscous_nm_s_rad = 0.002\noffset_nm = 0.0\n";
+    let axis = file("spindle.toml", axis);
+    let run = |motor: &str| {
+        json(&[
+            "simulate",
+            &axis,
+            "--scenario",
+            "friction-sweep",
+            "--controller",
+            "pi",
+            "--seconds",
+            "30",
+            "--motor",
+            motor,
+        ])
+    };
+    assert_eq!(run("left"), run("right"));
+}
+
+#[test]
+fn a_motion_that_is_not_finite_ends_with_its_step_and_keeps_its_log() {
+    let tether = "[surroundings]\ntether = { stiffness_n_m = 1e308, anchor_m = -100.0 }\n[limits]";
+    let broken = paper_with("tether.toml", &[("[limits]", tether)]);
+    let path = file("broken.csv", "");
+    let message = refusal(&["simulate", PAPER, "--robot", &broken, "--log", &path], 1);
+    assert!(message.contains("not finite from step 1 (0.001 s) on"), "{message}");
+    assert_eq!(std::fs::read_to_string(&path).unwrap().lines().count(), 2);
+}
+
 #[test]
 fn a_log_that_cannot_be_written_leaves_nothing_behind() {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("unwritable");
@@ -263,6 +423,12 @@ fn wrong_models_are_refused_with_file_and_line() {
     assert!(refusal(&["simulate", &axis], 1).contains("[robot]"));
     let bare = file("bare.toml", paper.split("[lqr]").next().unwrap());
     assert!(refusal(&["gains", &bare], 1).contains("[lqr]"));
+    let message = refusal(&["simulate", &bare, "--controller", "lqr"], 1);
+    assert!(message.contains("bare.toml") && message.contains("[lqr]"), "{message}");
+    assert!(refusal(&["simulate", PAPER, "--seconds", "1e9"], 1).contains("3600"));
+    assert!(refusal(&["simulate", PAPER, "--leg-height", "0.9"], 1).contains("leg_height_m = 0.9"));
+    let short = ["simulate", PAPER, "--scenario", "friction-sweep", "--controller", "pi", "--seconds", "5"];
+    assert!(refusal(&short, 1).contains("give at least"));
 }
 
 #[test]
@@ -278,10 +444,18 @@ fn wrong_usage_ends_with_2() {
         &["gains"][..],
         &["no-such-command"],
         &["simulate", PAPER, "--seconds", "-1"],
+        &["simulate", PAPER, "--scenario", "moon"],
+        &["simulate", PAPER, "--controller", "pi"],
+        &["simulate", PAPER, "--kp", "0.5"],
+        &["simulate", PAPER, "--kp", "-0.5", "--ki", "0"],
+        &["simulate", PAPER, "--gain", "1,2,3"],
+        &["simulate", PAPER, "--gain", "1,2,3,inf"],
         &["--paused", "gains", PAPER],
     ] {
         refusal(arguments, 2);
     }
+    let message = refusal(&["simulate", PAPER, "--scenario", "kick", "--controller", "pi"], 2);
+    assert!(message.contains("use lqr or flqr"), "{message}");
 }
 
 /// Other systems have a display even where these variables are not set.

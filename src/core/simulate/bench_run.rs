@@ -68,13 +68,16 @@ impl SpeedGains {
         Self { kp: 20.0 * inertia_kg_m2, ki: 20.0 * inertia_kg_m2 }
     }
 
-    /// Phase margin of the loop with an inertia and a delay, by the sampled speed half a tick older, rad; not
-    /// above 0 where the loop is unstable.
+    /// Phase margin of the loop with an inertia and a delay, half a tick of which is the hold's, rad: not above
+    /// 0 where the loop is unstable, π without any gain.
     pub(super) fn phase_margin_rad(self, inertia_kg_m2: f64, delay_s: f64) -> f64 {
         let Self { kp, ki } = self;
         // |kp + ki/(jω)| = I ω
         let (p, i) = (kp / inertia_kg_m2, ki / inertia_kg_m2);
         let crossover = (0.5 * (p * p + (p.powi(4) + 4.0 * i * i).sqrt())).sqrt();
+        if crossover == 0.0 {
+            return std::f64::consts::PI;
+        }
         libm::atan2(p * crossover, i) - crossover * (delay_s + 0.5 * TICK_S)
     }
 }

@@ -29,7 +29,8 @@ pub enum Scenario {
     /// Stands upright from rest: noise and friction alone.
     Station,
     /// Torques of many frequencies, 0.3 to 4.7 Hz, on top of the controller's, other ones left and right: from
-    /// below the balance's own 2 rad/s up to where it no longer follows. With `pi` the wheels are in the air.
+    /// where the balance answers them up to where masses and inertias alone do. With `pi` the wheels are in the
+    /// air.
     Multisine,
 }
 
