@@ -414,10 +414,10 @@ fn exports_carry_the_gain() {
 #[test]
 fn wrong_models_are_refused_with_file_and_line() {
     let paper = std::fs::read_to_string(PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(PAPER)).unwrap();
-    let key = file("key.toml", &paper.replace("com_height_m", "com_hight_m"));
-    let line = 1 + paper.lines().position(|line| line.starts_with("com_height_m")).unwrap();
+    let key = file("key.toml", &paper.replace("wheel_radius_m", "wheel_radus_m"));
+    let line = 1 + paper.lines().position(|line| line.starts_with("wheel_radius_m")).unwrap();
     let message = refusal(&["gains", &key], 1);
-    assert!(message.contains(&format!("key.toml:{line}:")) && message.contains("com_hight_m"), "{message}");
+    assert!(message.contains(&format!("key.toml:{line}:")) && message.contains("wheel_radus_m"), "{message}");
     let axis = file("axis.toml", "name = \"a\"\n[axis]\nkind = \"linear\"\nmass_kg = 1.0\n");
     assert!(refusal(&["gains", &axis], 1).contains("[robot]"));
     assert!(refusal(&["simulate", &axis], 1).contains("[robot]"));
