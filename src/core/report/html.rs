@@ -58,6 +58,7 @@ fn body(document: &Document, markup: &mut Markup) {
 struct Counters {
     sections: usize,
     charts: usize,
+    tables: usize,
 }
 
 fn sections(document: &Document) -> impl Iterator<Item = &str> {
@@ -98,7 +99,10 @@ fn block(block: &Block, counters: &mut Counters, markup: &mut Markup) {
                 items.iter().for_each(|item| markup.text_element("li", &[], item));
             });
         }
-        Block::Table(table) => self::table(table, markup),
+        Block::Table(table) => {
+            counters.tables += 1;
+            self::table(table, counters.tables, markup);
+        }
         Block::Figure(chart) => {
             counters.charts += 1;
             figure(chart, counters.charts, markup);
@@ -132,13 +136,15 @@ fn figure(chart: &Chart, number: usize, markup: &mut Markup) {
     });
 }
 
-fn table(table: &Table, markup: &mut Markup) {
+fn table(table: &Table, number: usize, markup: &mut Markup) {
+    // Not a caption element, which would be no wider than the table.
+    let id = format!("table-{number}");
+    markup.text_element("p", &[("class", &"caption"), ("id", &id)], &table.caption);
     // A table wider than the page scrolls by itself, with keys too.
     let region: [Attribute<'_>; 4] =
-        [("class", &"scroll"), ("tabindex", &0), ("role", &"region"), ("aria-label", &table.caption)];
+        [("class", &"scroll"), ("tabindex", &0), ("role", &"region"), ("aria-labelledby", &id)];
     markup.element("div", &region, |markup| {
-        markup.element("table", &[], |markup| {
-            markup.text_element("caption", &[], &table.caption);
+        markup.element("table", &[("aria-labelledby", &id)], |markup| {
             markup.element("thead", &[], |markup| table_head(table, markup));
             markup.element("tbody", &[], |markup| {
                 for row in &table.rows {
