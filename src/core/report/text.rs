@@ -6,6 +6,8 @@ use super::table::{Cell, Table};
 use super::{Block, Document};
 
 const COLUMNS: usize = 100;
+/// Widest text in a table.
+const CELL: usize = 44;
 
 pub(super) fn document(document: &Document) -> String {
     let mut out = underlined(&document.title, '=');
@@ -94,7 +96,7 @@ fn table(table: &Table) -> String {
     };
     let heads: Vec<String> = table.columns.iter().map(|column| one_line(&column.label())).collect();
     let cells = |row: &Vec<Cell>| row.iter().enumerate().map(|(number, cell)| text(number, cell)).collect();
-    let rows: Vec<Vec<String>> = table.rows.iter().map(cells).collect();
+    let rows: Vec<Vec<String>> = table.rows.iter().map(cells).flat_map(in_lines).collect();
     let mut widths: Vec<usize> = heads.iter().map(|head| head.chars().count()).collect();
     for row in &rows {
         for (width, cell) in widths.iter_mut().zip(row) {
@@ -121,6 +123,17 @@ fn table(table: &Table) -> String {
         out += &paragraph(&table.note);
     }
     out
+}
+
+/// A row as the lines that it takes where long texts are broken.
+fn in_lines(cells: Vec<String>) -> Vec<Vec<String>> {
+    let broken =
+        |cell: &String| if cell.chars().count() > CELL { wrap(cell, CELL) } else { vec![cell.clone()] };
+    let broken: Vec<Vec<String>> = cells.iter().map(broken).collect();
+    let count = broken.iter().map(Vec::len).max().unwrap_or(0);
+    (0..count)
+        .map(|line| broken.iter().map(|cell| cell.get(line).cloned().unwrap_or_default()).collect())
+        .collect()
 }
 
 /// The names of groups over their columns, which become as wide as that takes.
