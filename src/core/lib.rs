@@ -11,6 +11,7 @@
 //! | [`record`] | logs: schema, reading, writing, health |
 //! | [`identify`] | friction and inertia from logs |
 //! | [`report`] | what was found, as HTML and as text |
+//! | [`reproduce`] | every experiment of the paper, ours beside theirs |
 //! | [`export`] | a controller as C header, JSON, YAML or CSV |
 //! | [`model_file`] | models on disk (TOML) |
 //!
@@ -31,6 +32,7 @@ pub mod parallel;
 mod parameter;
 pub mod record;
 pub mod report;
+pub mod reproduce;
 pub mod robot;
 pub mod simulate;
 
