@@ -7,6 +7,7 @@ mod gains;
 mod input;
 mod output;
 mod progress;
+mod reproduce;
 mod riccati;
 mod simulate;
 mod window;
@@ -42,6 +43,8 @@ enum Command {
     Fit(fit::Arguments),
     /// Run the simulated robot
     Simulate(simulate::Arguments),
+    /// Every experiment of the paper on the simulated robot, ours beside theirs
+    Reproduce(reproduce::Arguments),
     /// Write what a robot's firmware or a script takes over
     Export(export::Arguments),
 }
@@ -59,6 +62,7 @@ pub(crate) fn run(cli: Cli) -> ExitCode {
         Some(Command::Riccati(arguments)) => riccati::run(&arguments, &output),
         Some(Command::Fit(arguments)) => fit::run(&arguments, &output),
         Some(Command::Simulate(arguments)) => simulate::run(&arguments, &output),
+        Some(Command::Reproduce(arguments)) => reproduce::run(&arguments, &output),
         Some(Command::Export(arguments)) => export::run(&arguments, &output),
     };
     match done {

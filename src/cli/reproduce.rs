@@ -1,0 +1,72 @@
+//! `flqr reproduce`: every experiment of the paper, ours beside theirs.
+
+use std::num::NonZeroUsize;
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::thread;
+
+use clap::Args;
+use flqr_core::model_file::{Model, presets};
+use flqr_core::reproduce::{self, DEFAULT_SEEDS, Settings};
+
+use super::output::{Failure, Output, complain};
+use super::progress::Progress;
+use super::{file, input};
+
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// Model file (TOML) with a [robot] and an [lqr] table; without it, the paper's robot
+    model: Option<PathBuf>,
+    /// Seed of all noise
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Seeds of the balance experiments, from --seed on: what shows how much is chance
+    #[arg(long, value_name = "N", default_value_t = DEFAULT_SEEDS)]
+    seeds: NonZeroUsize,
+    /// Threads; the result does not depend on them [default: one for each processor]
+    #[arg(long, value_name = "N")]
+    threads: Option<NonZeroUsize>,
+    /// Write the report with its figures as one HTML file
+    #[arg(long, value_name = "OUT.html")]
+    report: Option<PathBuf>,
+}
+
+pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
+    let (model, text) = load(arguments)?;
+    let every = || thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
+    let settings = Settings {
+        model_text: &text,
+        seed: arguments.seed,
+        seeds: arguments.seeds,
+        threads: arguments.threads.unwrap_or_else(every),
+    };
+    let bar = Progress::new("the paper's experiments");
+    let found = reproduce::reproduce(&model, &settings, &mut |share| {
+        bar.set((1000.0 * share) as u64, 1000);
+        ControlFlow::Continue(())
+    });
+    drop(bar);
+    let found = found.map_err(|error| match &arguments.model {
+        Some(path) => Failure::Message(format!("{}: {error}", path.display())),
+        None => Failure::from_error(error),
+    })?;
+    match &arguments.report {
+        Some(path) => {
+            file::write(path, "report", |out| out.write_all(found.document.to_html().as_bytes()))?;
+            complain(&format!("the report with its figures is in {}", path.display()));
+        }
+        None => complain("the figures are in the report: --report OUT.html writes it"),
+    }
+    output.result(&found, |out| out.write_all(found.document.to_text().as_bytes()))
+}
+
+/// The model and its file's text, in which comments say where its numbers come from.
+fn load(arguments: &Arguments) -> Result<(Model, String), Failure> {
+    match &arguments.model {
+        Some(path) => Ok((input::load_model(path)?, input::read_text(path)?)),
+        None => {
+            let [(_, text), ..] = presets::ALL;
+            Ok((presets::paper(), text.to_owned()))
+        }
+    }
+}
