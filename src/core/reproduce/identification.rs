@@ -12,6 +12,8 @@ use crate::report::{Axis, Chart, Mark, Panel, Scale, Series};
 
 /// What the fitted curve may be off at any measured speed.
 const CURVE_TOLERANCE: f64 = 0.02;
+/// Share of the fastest speed that is shown once more, because the curve bends there.
+const SLOW: f64 = 0.06;
 const MOTORS: [&str; 2] = ["left", "right"];
 /// Rows of Tables 3 and 4 with the model file's keys.
 const NAMES: [(&str, &str); 6] = [
@@ -42,7 +44,10 @@ pub(super) fn write(robot: &RobotModel, motors: &[Identified; 2], pages: &mut Pa
     pages.contradiction(2, error_unit(motors));
     pages.contradiction(9, pair_count(motors));
     pages.chart(error_chart(motors));
-    pages.chart(curve_chart(motors));
+    let fastest = motors.iter().flat_map(|motor| &motor.fit.pairs).map(|pair| pair.speed_rad_s.abs());
+    let fastest = fastest.fold(0.0, f64::max);
+    pages.chart(curve_chart(motors, "Figure 5: fitted friction", fastest));
+    pages.chart(curve_chart(motors, "Figure 5 at slow speeds", SLOW * fastest));
 }
 
 fn motor_table(robot: &RobotModel) -> Table {
@@ -338,10 +343,10 @@ fn error_chart(motors: &[Identified; 2]) -> Chart {
     }
 }
 
-fn curve_chart(motors: &[Identified; 2]) -> Chart {
+/// The curves up to a speed.
+fn curve_chart(motors: &[Identified; 2], title: &str, fastest: f64) -> Chart {
     let panel = |(motor, name): (&Identified, &str)| {
-        let pairs = &motor.fit.pairs;
-        let fastest = pairs.iter().map(|pair| pair.speed_rad_s.abs()).fold(0.0, f64::max);
+        let pairs = motor.fit.pairs.iter().filter(|pair| pair.speed_rad_s.abs() <= fastest);
         let curve = |curve: Stribeck| {
             (-500..=500).map(move |i| fastest * f64::from(i) / 500.0).map(move |speed| {
                 // Nothing joins the two directions: at rest there is no single value.
@@ -349,7 +354,7 @@ fn curve_chart(motors: &[Identified; 2]) -> Chart {
             })
         };
         let mut series = vec![
-            Series::new("pairs", Mark::Scatter, pairs.iter().map(|pair| [pair.speed_rad_s, pair.torque_nm])),
+            Series::new("pairs", Mark::Scatter, pairs.map(|pair| [pair.speed_rad_s, pair.torque_nm])),
             Series::new("true curve", Mark::Line, curve(motor.curve)),
         ];
         series.extend(
@@ -358,7 +363,7 @@ fn curve_chart(motors: &[Identified; 2]) -> Chart {
         Panel::new(Axis::new(format!("Friction torque, {name} motor"), "N m"), series)
     };
     Chart {
-        title: "Figure 5: fitted friction".to_owned(),
+        title: title.to_owned(),
         description:
             "Pairs of the simulated bench, the friction it was given, and the curve that was fitted."
                 .to_owned(),
