@@ -167,7 +167,15 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     if let (Some(path), Some(kept)) = (&arguments.log, kept) {
         write_log(path, kept, motor)?;
     }
-    report(output, &declared.name, &outcome.map_err(in_file)?, motor)
+    let name = &declared.name;
+    match &outcome.map_err(in_file)? {
+        Outcome::Ground(run) => report_ground(output, name, run),
+        Outcome::Bench(run) => {
+            let side = if motor == Motor::Left { "left" } else { "right" };
+            let title = declared.robot().map_or(name.clone(), |_| format!("{name}, {side} motor"));
+            report_bench(output, &title, run, motor)
+        }
+    }
 }
 
 fn experiment(arguments: &Arguments) -> Experiment {
@@ -200,13 +208,6 @@ fn write_log(path: &Path, outcome: &Outcome, motor: Motor) -> Result<(), Failure
     file::write(path, "log", |out| record::write_log(&log, out))
 }
 
-fn report(output: &Output, name: &str, outcome: &Outcome, motor: Motor) -> Result<(), Failure> {
-    match outcome {
-        Outcome::Ground(run) => report_ground(output, name, run),
-        Outcome::Bench(run) => report_bench(output, name, run, motor),
-    }
-}
-
 fn report_ground(output: &Output, name: &str, run: &Run) -> Result<(), Failure> {
     let Statistics { from_s, x_m, x_dot_m_s, pitch_rad, settled, fell } = run.statistics;
     let keys = Simulated {
@@ -233,7 +234,7 @@ fn report_ground(output: &Output, name: &str, run: &Run) -> Result<(), Failure> 
     })
 }
 
-fn report_bench(output: &Output, name: &str, run: &BenchRun, motor: Motor) -> Result<(), Failure> {
+fn report_bench(output: &Output, title: &str, run: &BenchRun, motor: Motor) -> Result<(), Failure> {
     let [motor_speed_rad_s, torque_nm] = run.statistics(motor);
     let keys = Simulated {
         statistics: Quantities::Bench { motor_speed_rad_s, torque_nm },
@@ -245,7 +246,7 @@ fn report_bench(output: &Output, name: &str, run: &BenchRun, motor: Motor) -> Re
         warnings: &run.warnings,
     };
     output.result(&keys, |out| {
-        writeln!(out, "{name}, {motor:?} motor\n")?;
+        writeln!(out, "{title}\n")?;
         table(out, &[("speed, rad/s", motor_speed_rad_s), ("torque, N m", torque_nm)])?;
         let Some(tracking) = run.tracking else { return Ok(()) };
         writeln!(

@@ -227,10 +227,9 @@ impl<'a> Bench<'a> {
         let readings = self.sensors.read(&truth, tick);
         let target_speed_rad_s = program.target_rad_s(time_s);
         let mut torque_nm = [0.0; 2];
-        for motor in 0..2 {
-            torque_nm[motor] =
-                self.asked(motor, target_speed_rad_s, &readings, program.added_nm(motor, time_s));
-            self.advance(motor, torque_nm[motor]);
+        for (motor, torque) in torque_nm.iter_mut().enumerate() {
+            *torque = self.asked(motor, target_speed_rad_s, &readings, program.added_nm(motor, time_s));
+            self.advance(motor, *torque);
         }
         let mut sample = BenchSample {
             time_s: self.sensors.stamp(tick),

@@ -252,8 +252,18 @@ pub fn run(
 
 /// An experiment that can start.
 enum Plan {
-    Ground { controller: BalanceController, declared: Box<RobotModel>, actual: Box<RobotModel> },
-    Bench { control: [SpeedPi; 2], program: Program, gains: SpeedGains, declared: BenchRig, actual: BenchRig },
+    Ground {
+        controller: BalanceController,
+        declared: Box<RobotModel>,
+        actual: Box<RobotModel>,
+    },
+    Bench {
+        control: [SpeedPi; 2],
+        program: Program,
+        gains: SpeedGains,
+        declared: Box<BenchRig>,
+        actual: Box<BenchRig>,
+    },
 }
 
 impl Experiment {
@@ -374,27 +384,34 @@ impl Plan {
             gains,
             compensated.then_some(compensation.unwrap_or(DEFAULT_COMPENSATION)),
         )?;
-        Ok(Self::Bench { control, program, gains, declared, actual })
+        Ok(Self::Bench { control, program, gains, declared: Box::new(declared), actual: Box::new(actual) })
     }
 
     fn warnings(&self) -> Vec<String> {
         let unstable = |declared: bool, actual: bool, loop_of: &str, mend: &str| match (declared, actual) {
-            (true, _) => Some(format!("{loop_of} is unstable with the model's delay: {mend}")),
+            (true, _) => {
+                Some(format!("{loop_of} is unstable on the model as it runs, delay included: {mend}"))
+            }
             (false, true) => Some(format!(
-                "{loop_of} is stable with the model but unstable with the robot that is simulated: {mend}"
+                "{loop_of} is stable on the model but unstable on the robot that is simulated: {mend}"
             )),
             (false, false) => None,
         };
         match self {
             Self::Ground { controller, declared, actual } => {
                 let fails = |robot: &RobotModel| !is_stable(robot, &controller.gain);
-                let mend = "lower the gains, or design them with other weights";
+                let mend = "design it with other weights, or shorten the delay";
                 unstable(fails(declared), fails(actual), "the balance under this gain", mend)
             }
             Self::Bench { gains, declared, actual, .. } => {
                 let fails =
                     |rig: &BenchRig| gains.phase_margin_rad(rig.inertia_kg_m2, rig.actuation.delay_s) <= 0.0;
-                unstable(fails(declared), fails(actual), "the speed control", "lower kp and ki")
+                unstable(
+                    fails(declared),
+                    fails(actual),
+                    "the speed control",
+                    "lower kp and ki, or shorten the delay",
+                )
             }
         }
         .into_iter()
@@ -425,12 +442,5 @@ fn speed_control(
 
 /// Whether the loop as it runs on a robot is stable: sampled, delayed, with a held IMU.
 fn is_stable(robot: &RobotModel, gain: &Matrix2x4<f64>) -> bool {
-    let timing = SampledLoop {
-        tick_s: TICK_S,
-        delay_s: robot.actuation.delay_s,
-        imu_period_s: TICK_S * f64::from(robot.sensors.imu_period_ticks()),
-        imu_latency_s: robot.sensors.imu_latency_s,
-        wheel_radius_m: robot.parameters.wheel_radius_m,
-    };
-    lqr::margins(&robot.parameters.linear_model(), gain, &timing).stable
+    lqr::margins(&robot.parameters.linear_model(), gain, &SampledLoop::of(robot)).stable
 }

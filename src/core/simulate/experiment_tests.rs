@@ -190,9 +190,9 @@ fn a_gain_that_only_the_declared_robot_bears_is_told() {
     let experiment = Experiment::new(Scenario::Flat, ControllerChoice::Lqr);
     let slow = changed(|robot| robot.actuation.delay_s = 0.2);
     let told = experiment.check(&presets::paper(), &slow).unwrap();
-    assert!(told.len() == 1 && told[0].contains("unstable with the robot that is simulated"), "{told:?}");
+    assert!(told.len() == 1 && told[0].contains("unstable on the robot that is simulated"), "{told:?}");
     let told = experiment.check(&slow, &slow).unwrap();
-    assert!(told.len() == 1 && told[0].contains("unstable with the model's delay"), "{told:?}");
+    assert!(told.len() == 1 && told[0].contains("unstable on the model as it runs"), "{told:?}");
 }
 
 #[test]

@@ -231,11 +231,10 @@ impl Simulation {
 
     fn advance(&mut self, asked: [f64; 2]) {
         let speeds = self.plant.motor_speed_rad_s();
-        let mut torque_nm = [0.0; 2];
-        for motor in 0..2 {
+        let torque_nm = std::array::from_fn(|motor| {
             let noise = self.torque_noise[motor].normal(self.torque_noise_nm);
-            torque_nm[motor] = self.actuators[motor].step(asked[motor], speeds[motor]) + noise;
-        }
+            self.actuators[motor].step(asked[motor], speeds[motor]) + noise
+        });
         let push = if self.push_ticks_left > 0 { self.push } else { Forcing::default() };
         self.push_ticks_left = self.push_ticks_left.saturating_sub(1);
         self.plant.advance(&Forcing { torque_nm, ..push }, TICK_S, self.substeps);
