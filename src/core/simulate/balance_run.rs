@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use super::experiment::Push;
 use super::ground::Ground;
-use super::plant::Pose;
+use super::plant::{Plant, Pose};
 use super::sample::Sample;
 use super::scenario::Scenario;
 use super::simulation::{Command, Fall, NotFinite, Simulation, SimulationError, SimulationSettings, TICK_S};
@@ -73,6 +73,21 @@ enum Motion {
     Torques([Multisine; 2]),
 }
 
+impl Scenario {
+    /// The ground under the left and the right wheel of a robot, on top of its slope.
+    pub fn grounds(self, robot: &RobotModel) -> [Ground; 2] {
+        Plant::grounds_under(robot, &self.own_grounds()).map(Ground::clone)
+    }
+
+    fn own_grounds(self) -> [Ground; 2] {
+        let [start, ramp, deck, height] = BRIDGE_M;
+        match self {
+            Self::Bridge => [Ground::bridge(start, ramp, deck, height), Ground::flat()],
+            _ => [const { Ground::flat() }; 2],
+        }
+    }
+}
+
 impl Course {
     /// The course of a scenario on the ground.
     pub(super) fn new(scenario: Scenario, seconds: f64, kick: &Push) -> Self {
@@ -84,13 +99,12 @@ impl Course {
             push: None,
             ticks: (seconds / TICK_S).round() as usize,
         };
-        let [start, ramp, deck, height] = BRIDGE_M;
         match scenario {
             Scenario::Flat => Self { initial: pitched, ..station },
             Scenario::Kick => Self { initial: pitched, push: Some(*kick), ..station },
             Scenario::Bridge => Self {
                 initial: pitched,
-                grounds: [Ground::bridge(start, ramp, deck, height), Ground::flat()],
+                grounds: scenario.own_grounds(),
                 motion: Motion::Move(BRIDGE_DRIVE),
                 ..station
             },

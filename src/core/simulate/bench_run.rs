@@ -36,10 +36,21 @@ pub struct BenchRun {
 impl BenchRun {
     /// Statistics of one motor's measured speed, rad/s, and torque, N m, over the whole run.
     pub fn statistics(&self, motor: Motor) -> [Summary; 2] {
+        Self::statistics_of(&self.samples, motor)
+    }
+
+    /// The same from one time to another, both included; none without samples between them.
+    pub fn statistics_between(&self, motor: Motor, [from_s, to_s]: [f64; 2]) -> Option<[Summary; 2]> {
+        let from = self.samples.partition_point(|sample| sample.time_s < from_s);
+        let to = self.samples.partition_point(|sample| sample.time_s <= to_s);
+        (from < to).then(|| Self::statistics_of(&self.samples[from..to], motor))
+    }
+
+    fn statistics_of(samples: &[BenchSample], motor: Motor) -> [Summary; 2] {
         let motor = motor as usize;
         [
-            summary(&self.samples, |sample| sample.motor_speed_rad_s[motor]),
-            summary(&self.samples, |sample| sample.torque_nm[motor]),
+            summary(samples, |sample| sample.motor_speed_rad_s[motor]),
+            summary(samples, |sample| sample.torque_nm[motor]),
         ]
     }
 }

@@ -46,12 +46,24 @@ pub struct Statistics {
 }
 
 impl Statistics {
-    /// Statistics of a run's samples in the order of time; none without samples.
+    /// Statistics of a run's samples in the order of time, from 15 s on where it is longer; none without
+    /// samples.
     pub fn of(samples: &[Sample]) -> Option<Self> {
         let end_s = samples.last()?.time_s;
-        let after = |from_s: f64| &samples[samples.partition_point(|sample| sample.time_s < from_s)..];
         let from_s = if end_s > STATISTICS_FROM_S { STATISTICS_FROM_S } else { samples[0].time_s };
+        Self::between(samples, [from_s, end_s])
+    }
+
+    /// The same of the samples from one time to another, both included; none without samples between them.
+    /// Whether the robot settled or fell is said of the whole run.
+    pub fn between(samples: &[Sample], [from_s, to_s]: [f64; 2]) -> Option<Self> {
+        let end_s = samples.last()?.time_s;
+        let after = |from_s: f64| &samples[samples.partition_point(|sample| sample.time_s < from_s)..];
         let counted = after(from_s);
+        let counted = &counted[..counted.partition_point(|sample| sample.time_s <= to_s)];
+        if counted.is_empty() {
+            return None;
+        }
         let fell = samples.iter().any(|sample| sample.pitch_rad.abs() > FALL_PITCH_RAD);
         // The last sample stands for the tick that it begins, so a run of 10 s ends at 9.999 s.
         let window = SETTLED_WINDOW_S - 0.0015;

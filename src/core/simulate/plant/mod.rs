@@ -87,13 +87,18 @@ impl Plant {
     /// The same with a ground of its own under the left and the right wheel, on top of the surroundings'
     /// slope; one that is flat leaves the surroundings' ground.
     pub fn on_ground(robot: &RobotModel, grounds: &[Ground; 2], start: &State) -> Self {
-        let own = &robot.surroundings.ground;
-        let grounds = [0, 1].map(|i: usize| if grounds[i].is_flat() { &own[i] } else { &grounds[i] });
+        let grounds = Self::grounds_under(robot, grounds);
         let laws = Laws::new(&robot.parameters, &robot.chassis, &robot.surroundings, grounds);
         let shafts = robot.friction.map(Shaft::new);
         let motion = laws.motion(start);
         let phases = [0, 1].map(|i: usize| shafts[i].phase_at(motion.speed[i]));
         Self { laws, shafts, motion, phases }
+    }
+
+    /// The ground under each wheel, of an experiment and of the surroundings.
+    pub(super) fn grounds_under<'a>(robot: &'a RobotModel, grounds: &'a [Ground; 2]) -> [&'a Ground; 2] {
+        let own = &robot.surroundings.ground;
+        [0, 1].map(|i: usize| if grounds[i].is_flat() { &own[i] } else { &grounds[i] })
     }
 
     /// Moves on by `dt_s` in `substeps` equal steps of order 4. A torque or state that is not finite makes
