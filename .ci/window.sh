@@ -3,10 +3,10 @@
 #
 #   .ci/window.sh BINARY OUTDIR [LOG]
 #
-# Changes a weight, loads LOG by its typed path (without LOG: friction pairs made here) and fits it; checks by
-# the program's own account (--state-out) that each step happened, and by the pictures that they are not blank
-# and differ. Needs Xvfb, openbox, xdotool, imagemagick and jq. Ends only the
-# processes it started.
+# Changes a weight, loads LOG by its typed path (without LOG: friction pairs made here) and fits it, runs LQR and
+# FLQR on flat ground, lets the time play and saves a picture and a report; checks by the program's own account
+# (--state-out) that each step happened, and by the pictures that they are not blank and differ. Needs Xvfb,
+# openbox, xdotool, imagemagick and jq. Ends only the processes it started.
 set -euo pipefail
 
 usage="usage: .ci/window.sh BINARY OUTDIR [LOG]"
@@ -121,9 +121,40 @@ picture fit
 differ weight log
 differ log fit
 
+echo "running LQR and FLQR"
+xdotool key ctrl+3
+until_state 10 "the experiments page is there" '.tab == "experiments"'
+picture no-run
+xdotool key ctrl+Return
+until_state 120 "both runs are there, and FLQR hunts less" \
+    '.experiments_tab.runs | length == 2 and .[0].statistics.x_m.std > .[1].statistics.x_m.std'
+picture experiments
+differ no-run experiments
+xdotool key space
+until_state 30 "the time plays" '.experiments_tab.cursor_s > 2'
+xdotool key space
+until_state 10 "the time is held" '.experiments_tab.playing == false'
+picture experiments-later
+differ experiments experiments-later
+for file in page.png report.html; do
+    rm -f "$out/$file"
+    xdotool key ctrl+l
+    sleep 0.5
+    xdotool key ctrl+a
+    xdotool type --delay 15 "$out/$file"
+    xdotool key Return
+    until_state 20 "$file is saved" ".message == \"Saved $out/$file.\""
+done
+colours=$(identify -format %k "$out/page.png")
+[ "$colours" -ge 100 ] || fail "page.png is blank: it has $colours colours"
+grep -q '<svg' "$out/report.html" || fail "report.html has no chart"
+
 echo "light"
 xdotool key ctrl+d
-sleep 0.8
+picture experiments-light
+differ experiments-later experiments-light
+xdotool key ctrl+2
+until_state 10 "the friction page is back" '.tab == "friction"'
 picture fit-light
 xdotool key ctrl+1
 until_state 10 "the tune page is back" '.tab == "tune"'

@@ -36,6 +36,7 @@ pub(crate) struct Arguments {
 enum TabName {
     Tune,
     Friction,
+    Experiments,
 }
 
 pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
@@ -45,6 +46,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
     };
     let tab = match (arguments.tab, &arguments.log) {
         (Some(TabName::Friction), _) | (None, Some(_)) => Tab::Friction,
+        (Some(TabName::Experiments), _) => Tab::Experiments,
         (Some(TabName::Tune), _) | (None, None) => Tab::Tune,
     };
     let options = WindowOptions {

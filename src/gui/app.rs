@@ -15,6 +15,7 @@ use crate::command::{Command, Commands, Source};
 use crate::context::ViewContext;
 use crate::design::Designer;
 use crate::dialog::{Answer, Dialog};
+use crate::experiments::ExperimentsTab;
 use crate::friction::FrictionTab;
 use crate::history::{Channel, History};
 use crate::job::{Job, Outcome, Waker};
@@ -33,6 +34,8 @@ pub enum Tab {
     Tune,
     /// Friction from a measured log.
     Friction,
+    /// The paper's experiments on the simulated robot.
+    Experiments,
 }
 
 /// The last message, for the status line.
@@ -70,6 +73,7 @@ pub struct App {
     history: History,
     tune: TuneTab,
     friction: FrictionTab,
+    experiments: ExperimentsTab,
     commands: Commands,
     status: Status,
     recent: Recent,
@@ -108,6 +112,7 @@ impl App {
             live: Live::start(&waker, options.paused)?,
             history: History::default(),
             friction: FrictionTab::new(&options.column_map),
+            experiments: ExperimentsTab::default(),
             commands: Commands::default(),
             status: Status::default(),
             recent: Recent::default(),
@@ -135,6 +140,9 @@ impl App {
         self.drain_live();
         self.drain_jobs();
         self.take_dropped_files(ctx);
+        if self.tab == Tab::Experiments {
+            self.experiments.advance(ctx);
+        }
         for command in self.commands.take() {
             self.apply(command, ctx);
         }
@@ -164,6 +172,7 @@ impl App {
         match self.tab {
             Tab::Tune => self.tune.ui(&context, ui),
             Tab::Friction => self.friction.ui(&context, ui),
+            Tab::Experiments => self.experiments.ui(&context, ui),
         }
     }
 
@@ -175,8 +184,13 @@ impl App {
     }
 
     fn drain_jobs(&mut self) {
-        if let Some(message) = self.friction.drain() {
+        for message in [self.friction.drain(), self.experiments.drain()].into_iter().flatten() {
             self.say(message);
+        }
+        match self.experiments.drain_saver(&self.waker) {
+            None => {}
+            Some(Ok(message)) => self.say(message),
+            Some(Err(problem)) => self.fail(problem),
         }
         if let Some(job) = &mut self.recent_job {
             match job.poll().1 {
@@ -214,6 +228,7 @@ impl App {
                 self.fail(problem.clone());
                 self.tune.note_dialog_problem(purpose, &problem);
                 self.friction.note_dialog_problem(purpose, &problem);
+                self.experiments.note_dialog_problem(purpose, &problem);
             }
         }
     }
@@ -293,6 +308,7 @@ impl App {
         let tab = match self.tab {
             Tab::Tune => "tune",
             Tab::Friction => "friction",
+            Tab::Experiments => "experiments",
         };
         let source = match self.source {
             Source::Simulated => "simulated",
@@ -325,6 +341,7 @@ impl App {
                 "displacement_mm": self.history.last(Channel::Displacement).map(|x_m| (1e3 * x_m).round()),
             },
             "friction_tab": self.friction.snapshot(),
+            "experiments_tab": self.experiments.snapshot(),
             "message": self.status.text,
         })
     }

@@ -9,6 +9,7 @@ use flqr_core::lqr::Weights;
 use flqr_core::robot::RobotParameters;
 
 use crate::app::Tab;
+use crate::experiments::SavedAs;
 
 /// Where measured values come from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -34,6 +35,7 @@ pub(crate) enum FilePurpose {
     OpenModel,
     SaveModel,
     OpenLog,
+    SaveExperiment(SavedAs),
 }
 
 /// One wish of a view.
@@ -76,6 +78,14 @@ pub(crate) enum Command {
     StartFit,
     CancelFit,
     UseFit(Target),
+    StartExperiment,
+    CancelExperiment,
+    /// Saves the runs of the experiment; an existing file is replaced only if `replace`.
+    SaveExperiment {
+        saved_as: SavedAs,
+        path: PathBuf,
+        replace: bool,
+    },
     /// One sentence for the status line.
     Say(String),
 }

@@ -15,7 +15,7 @@ const FASTEST_PERSON: Duration = Duration::from_millis(150);
 /// What to do where no dialog opens.
 fn instead(purpose: FilePurpose) -> &'static str {
     match purpose {
-        FilePurpose::SaveModel => "type a path above and press Save",
+        FilePurpose::SaveModel | FilePurpose::SaveExperiment(_) => "type a path above and press Save",
         FilePurpose::OpenModel | FilePurpose::OpenLog => {
             "type the path instead, or drop the file onto the window"
         }
@@ -54,6 +54,9 @@ fn ask(purpose: FilePurpose, suggestion: &str) -> Answer {
     let chosen = match purpose {
         FilePurpose::OpenModel => dialog.set_title("Open a model").add_filter("Model", &["toml"]).pick_file(),
         FilePurpose::SaveModel => dialog.set_title("Save the model").set_file_name(suggestion).save_file(),
+        FilePurpose::SaveExperiment(saved_as) => {
+            dialog.set_title(saved_as.title()).set_file_name(suggestion).save_file()
+        }
         FilePurpose::OpenLog => dialog.set_title("Open a log").add_filter("Log", &["csv", "txt"]).pick_file(),
     };
     match chosen {

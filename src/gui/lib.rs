@@ -1,4 +1,5 @@
-//! The window of flqr: tune the balance controller of a simulated robot, fit friction from a measured log.
+//! The window of flqr: tune the balance controller of a simulated robot, fit friction from a measured log, compare
+//! LQR and FLQR in the paper's experiments.
 //!
 //! # Architecture
 //! - One owner: [`App`] holds the session document, the design, the histories and the jobs.
@@ -13,11 +14,13 @@ mod command;
 mod context;
 mod design;
 mod dialog;
+mod experiments;
 mod friction;
 mod history;
 mod job;
 mod live;
 pub mod plot;
+mod quantity;
 mod recent;
 mod session;
 mod state_out;

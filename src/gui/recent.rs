@@ -98,7 +98,7 @@ impl RecentFile {
         let path = self.path.clone();
         self.job = self.waiting.take().and_then(|text| {
             let write = move |_: &Reporter<()>| {
-                write_file(&path, &text).ok();
+                write_file(&path, text.as_bytes()).ok();
             };
             Job::start("save-recent", waker, write).ok()
         });

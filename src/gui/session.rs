@@ -53,6 +53,16 @@ impl Session {
         Model { name: self.name.clone(), rig: self.rig.clone() }
     }
 
+    /// The model as it is used, with what is filled in.
+    pub(crate) fn model_in_use(&self) -> Model {
+        let mut model = self.model();
+        if let Rig::Robot(robot) = &mut model.rig {
+            robot.weights = Some(self.weights());
+            robot.compensation = Some(self.compensation());
+        }
+        model
+    }
+
     /// The robot, where the model is one.
     pub(crate) fn robot(&self) -> Option<&RobotModel> {
         match &self.rig {

@@ -25,7 +25,7 @@ impl StateOut {
         std::thread::Builder::new().name("state-out".to_owned()).spawn(move || {
             for text in receiver {
                 // A full disk must not end the window; the script sees an old file.
-                write_file(&path, &text).ok();
+                write_file(&path, text.as_bytes()).ok();
             }
         })?;
         Ok(Self { sender, last: Value::Null, last_time: None })

@@ -14,6 +14,8 @@ pub(crate) struct Palette {
     pub(crate) reference: Color32,
     /// Curves of displacement, velocity and pitch.
     pub(crate) channels: [Color32; 3],
+    /// Runs that are compared: without and with friction compensation; the colours of reports.
+    pub(crate) runs: [Color32; 2],
     /// Measured points.
     pub(crate) measured: Color32,
     pub(crate) good: Color32,
@@ -29,6 +31,7 @@ const DARK: Palette = Palette {
         Color32::from_rgb(92, 208, 158),
         Color32::from_rgb(245, 178, 92),
     ],
+    runs: [Color32::from_rgb(92, 184, 238), Color32::from_rgb(242, 149, 90)],
     measured: Color32::from_rgb(170, 178, 192),
     good: Color32::from_rgb(92, 208, 158),
     warning: Color32::from_rgb(245, 186, 92),
@@ -39,6 +42,7 @@ const LIGHT: Palette = Palette {
     accent: Color32::from_rgb(18, 96, 200),
     reference: Color32::from_rgb(130, 136, 148),
     channels: [Color32::from_rgb(18, 96, 200), Color32::from_rgb(14, 128, 84), Color32::from_rgb(186, 98, 8)],
+    runs: [Color32::from_rgb(0, 114, 178), Color32::from_rgb(213, 94, 0)],
     measured: Color32::from_rgb(96, 104, 118),
     good: Color32::from_rgb(14, 128, 84),
     warning: Color32::from_rgb(164, 92, 0),

@@ -6,12 +6,12 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Writes by way of a second file beside `path`, so that a crash leaves the old content or the new one. Each
 /// call has a second file of its own, so that two at a time, also of two windows, never mix their contents.
-pub(crate) fn write_file(path: &Path, text: &str) -> std::io::Result<()> {
+pub(crate) fn write_file(path: &Path, content: &[u8]) -> std::io::Result<()> {
     if let Some(folder) = path.parent() {
         std::fs::create_dir_all(folder)?;
     }
     let beside = unique_name(path);
-    let written = std::fs::write(&beside, text).and_then(|()| std::fs::rename(&beside, path));
+    let written = std::fs::write(&beside, content).and_then(|()| std::fs::rename(&beside, path));
     if written.is_err() {
         std::fs::remove_file(&beside).ok();
     }
@@ -37,7 +37,7 @@ mod tests {
         let texts: Vec<String> = (1..=4).map(|length| "x".repeat(length * 50_000)).collect();
         std::thread::scope(|scope| {
             for text in &texts {
-                scope.spawn(|| (0..20).for_each(|_| write_file(&path, text).unwrap()));
+                scope.spawn(|| (0..20).for_each(|_| write_file(&path, text.as_bytes()).unwrap()));
             }
         });
         assert!(texts.contains(&std::fs::read_to_string(&path).unwrap()));
@@ -49,7 +49,7 @@ mod tests {
     fn a_target_that_cannot_be_replaced_stays_without_anything_beside_it() {
         let folder = std::env::temp_dir().join(format!("flqr-refused-{}", std::process::id()));
         std::fs::create_dir_all(folder.join("target/inside")).unwrap();
-        assert!(write_file(&folder.join("target"), "text").is_err());
+        assert!(write_file(&folder.join("target"), b"text").is_err());
         assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 1);
         std::fs::remove_dir_all(&folder).unwrap();
     }

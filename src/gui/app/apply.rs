@@ -26,6 +26,8 @@ pub(super) fn chosen(purpose: FilePurpose, path: PathBuf) -> Command {
         FilePurpose::SaveModel if path.extension().is_some() => Command::OverwriteModel(path),
         FilePurpose::SaveModel => Command::SaveModel(path),
         FilePurpose::OpenLog => Command::LoadLog(path),
+        // The dialog knows one name as it was typed; what is written may have another or several.
+        FilePurpose::SaveExperiment(saved_as) => Command::SaveExperiment { saved_as, path, replace: false },
     }
 }
 
@@ -98,6 +100,13 @@ impl App {
             Command::StartFit => self.start_fit(),
             Command::CancelFit => self.friction.cancel_fit(),
             Command::UseFit(target) => self.use_fit(target),
+            Command::StartExperiment => self.start_experiment(),
+            Command::CancelExperiment => self.experiments.cancel(),
+            Command::SaveExperiment { saved_as, path, replace } => {
+                if let Err(problem) = self.experiments.save(saved_as, path, replace, ctx, &self.waker) {
+                    self.fail(problem);
+                }
+            }
             Command::Say(text) => self.say(text),
         }
         ctx.request_repaint();
@@ -151,8 +160,10 @@ impl App {
             return;
         }
         let name = self.model_path.as_deref().and_then(Path::file_name);
-        let suggestion =
-            name.map_or_else(|| "model.toml".to_owned(), |name| name.to_string_lossy().into_owned());
+        let suggestion = match purpose {
+            FilePurpose::SaveExperiment(saved_as) => self.experiments.suggested_name(saved_as),
+            _ => name.map_or_else(|| "model.toml".to_owned(), |name| name.to_string_lossy().into_owned()),
+        };
         match Dialog::open(purpose, suggestion, &self.waker) {
             Ok(dialog) => self.dialog = Some(dialog),
             Err(error) => self.fail(format!("No thread for a file dialog: {error}.")),
@@ -223,7 +234,7 @@ impl App {
             if !replace && file.symlink_metadata().is_ok() {
                 return Ok(Saved::AnotherIsThere);
             }
-            crate::write_file::write_file(&file, &text).map(|()| Saved::Written).map_err(|error| {
+            crate::write_file::write_file(&file, text.as_bytes()).map(|()| Saved::Written).map_err(|error| {
                 format!("{} could not be saved: {error}; nothing was changed", file.display())
             })
         };
@@ -294,6 +305,17 @@ impl App {
         }
         self.tune.refresh(&self.session);
         self.send_robot();
+    }
+
+    fn start_experiment(&mut self) {
+        // The command line of a result names a file that holds the very same model.
+        let path = self
+            .model_path
+            .clone()
+            .filter(|_| self.session == self.saved && self.session.model_in_use() == self.session.model());
+        if let Err(problem) = self.experiments.start(self.session.model_in_use(), path, &self.waker) {
+            self.fail(problem);
+        }
     }
 
     pub(super) fn take_dropped_files(&mut self, ctx: &Context) {

@@ -13,12 +13,13 @@ const fn ctrl(key: Key) -> KeyboardShortcut {
 
 /// Keys and what they do; shown in the help menu.
 const HELP: &[(&str, &str)] = &[
-    ("Ctrl+1, Ctrl+2", "tune, friction"),
+    ("Ctrl+1, Ctrl+2, Ctrl+3", "tune, friction, experiments"),
     ("Ctrl+O", "open a model or a log"),
     ("Ctrl+S", "save the model"),
     ("Ctrl+E", "go to the first weight"),
-    ("Ctrl+L", "go to the path of the log"),
-    ("Ctrl+Enter", "start or cancel the fit"),
+    ("Ctrl+L", "go to the path of the log, or of what an experiment is saved to"),
+    ("Ctrl+Enter", "start or cancel the fit or the experiment"),
+    ("Space, ←, →", "play, step (with Shift or Alt: longer, shorter) an experiment"),
     ("Ctrl+P", "pause or run the simulated robot"),
     ("Ctrl+D", "light or dark"),
     ("Tab, Shift+Tab", "next, previous control"),
@@ -43,9 +44,12 @@ impl App {
         if pressed(Key::Num2) {
             send(Command::SelectTab(Tab::Friction));
         }
+        if pressed(Key::Num3) {
+            send(Command::SelectTab(Tab::Experiments));
+        }
         if pressed(Key::O) {
             send(Command::ShowDialog(match self.tab {
-                Tab::Tune => FilePurpose::OpenModel,
+                Tab::Tune | Tab::Experiments => FilePurpose::OpenModel,
                 Tab::Friction => FilePurpose::OpenLog,
             }));
         }
@@ -58,8 +62,14 @@ impl App {
         if pressed(Key::P) && self.source == Source::Simulated {
             send(Command::SetPaused(!self.live.status.paused));
         }
-        if pressed(Key::Enter) && self.tab == Tab::Friction {
-            send(if self.friction.fit_is_running() { Command::CancelFit } else { Command::StartFit });
+        if pressed(Key::Enter) {
+            match self.tab {
+                Tab::Tune => {}
+                Tab::Friction if self.friction.fit_is_running() => send(Command::CancelFit),
+                Tab::Friction => send(Command::StartFit),
+                Tab::Experiments if self.experiments.is_running() => send(Command::CancelExperiment),
+                Tab::Experiments => send(Command::StartExperiment),
+            }
         }
         if pressed(Key::D) {
             switch_theme(ui);
@@ -69,8 +79,12 @@ impl App {
             self.tune.focus_weights();
         }
         if pressed(Key::L) {
-            send(Command::SelectTab(Tab::Friction));
-            self.friction.focus_path();
+            if self.tab == Tab::Experiments {
+                self.experiments.focus_path();
+            } else {
+                send(Command::SelectTab(Tab::Friction));
+                self.friction.focus_path();
+            }
         }
     }
 
@@ -80,6 +94,11 @@ impl App {
             let tabs = [
                 (Tab::Tune, "Tune", "Weights, gains and the live robot (Ctrl+1)"),
                 (Tab::Friction, "Friction", "Friction from a measured log (Ctrl+2)"),
+                (
+                    Tab::Experiments,
+                    "Experiments",
+                    "LQR and FLQR side by side on the simulated robot (Ctrl+3)",
+                ),
             ];
             ui.scope(|ui| {
                 ui.spacing_mut().button_padding.x = 14.0;

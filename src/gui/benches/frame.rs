@@ -6,7 +6,7 @@
 use divan::Bencher;
 use egui::{Color32, Context, RawInput, Rect, Ui, vec2};
 use egui_plot::{Line, Plot, PlotPoint, PlotPoints};
-use flqr_gui::plot::{Curve, DecimationCache, TimePlot, TimeView};
+use flqr_gui::plot::{Curve, DecimationCache, TimeCurve, TimePlot, TimeView};
 
 const SAMPLES: usize = 60_000;
 const PLOTS: usize = 3;
@@ -52,13 +52,12 @@ fn ours(
         let plot = TimePlot {
             id,
             label: id,
-            color: Color32::LIGHT_BLUE,
             height: 240.0,
             x_label: (index == 2).then_some("time [s]"),
             min_y_span: 0.01,
         };
         let curve = Curve { x: &data.time_s, y: &data.values[index], scale: 1.0, gap: 0.02 };
-        plot.show(ui, view, cache, curve, generation);
+        plot.show(ui, view, &mut [TimeCurve { color: Color32::LIGHT_BLUE, curve, generation, cache }]);
     }
 }
 

@@ -4,7 +4,7 @@ use egui::{ComboBox, RichText, ScrollArea, Ui};
 use flqr_core::record::LogKind;
 
 use super::load::{LoadedLog, Loader};
-use crate::plot::{Curve, DecimationCache, TimePlot, TimeView};
+use crate::plot::{Curve, DecimationCache, TimeCurve, TimePlot, TimeView};
 use crate::theme::palette;
 use crate::widgets::{choice_ui, hint_ui, mono, section_ui, shown};
 
@@ -101,7 +101,6 @@ impl Preview {
         let plot = TimePlot {
             id: "preview",
             label: &column_data.name,
-            color: palette(ui.visuals()).channels[0],
             height: ui.available_height() - 24.0,
             x_label: Some(loaded.axis.label),
             min_y_span: 1e-6,
@@ -109,8 +108,9 @@ impl Preview {
         let curve = Curve { x: axis, y: &column_data.values, scale: 1.0, gap: loaded.axis.gap };
         // A log has fewer than 2^16 columns; the pair identifies the data.
         let generation = (loaded.generation << 16) | column as u64;
-        let statistics = plot.show(ui, &mut self.view, &mut self.cache, curve, generation);
-        if let Some(s) = statistics {
+        let color = palette(ui.visuals()).channels[0];
+        let line = TimeCurve { color, curve, generation, cache: &mut self.cache };
+        if let Some(s) = plot.show(ui, &mut self.view, &mut [line])[0] {
             let text = format!(
                 "visible: mean {}, std {}, peak to peak {}, {} samples",
                 shown(s.mean, 4),

@@ -67,6 +67,9 @@ fn grid_color(visuals: &Visuals) -> Color32 {
 
 /// A tick with the decimals that its step needs.
 fn tick(value: f64, step: f64) -> String {
+    if value.abs() >= 1e6 {
+        return format!("{value:.1e}").replace('-', "−");
+    }
     let decimals = (-step.abs().log10().floor()).clamp(0.0, 9.0) as usize;
     let text = format!("{value:.decimals$}");
     let zero = text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.');
@@ -94,5 +97,6 @@ mod tests {
         assert_eq!(tick(-0.15, 0.05), "−0.15");
         assert_eq!(tick(-0.0, 0.1), "0.0");
         assert_eq!(tick(20.0, 10.0), "20");
+        assert_eq!(tick(-2e13, 1e13), "−2.0e13");
     }
 }

@@ -2,8 +2,10 @@
 
 mod axes;
 mod decimate;
+mod marks;
 mod view;
 
 pub(crate) use axes::Axes;
 pub use decimate::{Curve, DecimationCache, RangeStatistics, Visible, decimate};
-pub use view::{TimePlot, TimeView};
+pub use marks::{Marks, Moved};
+pub use view::{TimeCurve, TimePlot, TimeView};

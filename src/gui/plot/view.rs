@@ -1,10 +1,11 @@
 //! One plot of a stack, and the horizontal range that the stack shares.
 
-use egui::{Color32, Response, Ui};
-use egui_plot::{Line, Plot, PlotPoints};
+use egui::{Color32, Ui};
+use egui_plot::{Line, Plot, PlotPoints, PlotResponse, PlotUi};
 
 use super::axes::{Axes, Y_AXIS_WIDTH};
 use super::decimate::{Curve, DecimationCache, RangeStatistics, Visible};
+use super::marks::{Marks, Moved};
 
 /// The shortest range that can be zoomed to.
 const MIN_SPAN: f64 = 1e-3;
@@ -71,8 +72,6 @@ pub struct TimePlot<'a> {
     pub id: &'a str,
     /// Label of the vertical axis, with the unit.
     pub label: &'a str,
-    /// Colour of the line.
-    pub color: Color32,
     /// Height in points.
     pub height: f32,
     /// Label of the horizontal axis; without one the axis is not drawn (the plot below has it).
@@ -81,28 +80,69 @@ pub struct TimePlot<'a> {
     pub min_y_span: f64,
 }
 
+/// One curve of a plot.
+pub struct TimeCurve<'a> {
+    /// Colour of the line.
+    pub color: Color32,
+    /// Its data.
+    pub curve: Curve<'a>,
+    /// Changes whenever the data do.
+    pub generation: u64,
+    /// What was drawn last.
+    pub cache: &'a mut DecimationCache,
+}
+
 impl TimePlot<'_> {
-    /// Draws the curve over the view's range, lets the user pan (drag), zoom (wheel) and resume following
-    /// (double click), and returns the statistics of what is visible.
+    /// Draws the curves over the view's range, lets the user pan (drag), zoom (wheel) and resume following
+    /// (double click), and returns the statistics of what is visible of each curve.
     pub fn show(
         &self,
         ui: &mut Ui,
         view: &mut TimeView,
-        cache: &mut DecimationCache,
-        curve: Curve<'_>,
-        generation: u64,
-    ) -> Option<RangeStatistics> {
-        let columns = (ui.available_width() - Y_AXIS_WIDTH).max(1.0) * ui.ctx().pixels_per_point();
-        let range = view.range();
-        let visible = cache.visible(curve, generation, range, columns as usize);
-        let response = self.draw(ui, visible, range);
-        interact(ui, &response.0, response.1, view);
-        visible.statistics
+        curves: &mut [TimeCurve<'_>],
+    ) -> Vec<Option<RangeStatistics>> {
+        let (shown, statistics) = self.draw(ui, view.range(), curves, |_| {});
+        interact(ui, &shown, view, true);
+        statistics
     }
 
-    fn draw(&self, ui: &mut Ui, visible: &Visible, range: [f64; 2]) -> (Response, egui_plot::PlotTransform) {
-        let y_range = y_range(visible.statistics, self.min_y_span);
-        let axes = Axes { x_label: self.x_label, y_label: self.label, x_lines: 8.0, y_lines: 4.0 };
+    /// The same with marks, which come first when something is dragged; also says what the user did to them.
+    pub fn show_marked(
+        &self,
+        ui: &mut Ui,
+        view: &mut TimeView,
+        curves: &mut [TimeCurve<'_>],
+        marks: &mut Marks,
+    ) -> Moved {
+        let color = ui.visuals().strong_text_color();
+        let (shown, _) = self.draw(ui, view.range(), curves, |plot_ui| marks.draw(plot_ui, color));
+        let moved = marks.interact(ui, &shown.response, &shown.transform);
+        interact(ui, &shown, view, !marks.held());
+        moved
+    }
+
+    fn draw(
+        &self,
+        ui: &mut Ui,
+        range: [f64; 2],
+        curves: &mut [TimeCurve<'_>],
+        beside: impl FnOnce(&mut PlotUi<'_>),
+    ) -> (PlotResponse<()>, Vec<Option<RangeStatistics>>) {
+        let columns = (ui.available_width() - Y_AXIS_WIDTH).max(1.0) * ui.ctx().pixels_per_point();
+        let drawn: Vec<(Color32, &Visible)> = curves
+            .iter_mut()
+            .map(|curve| {
+                (curve.color, curve.cache.visible(curve.curve, curve.generation, range, columns as usize))
+            })
+            .collect();
+        let statistics: Vec<_> = drawn.iter().map(|(_, visible)| visible.statistics).collect();
+        let y_range = y_range(&statistics, self.min_y_span);
+        let axes = Axes {
+            x_label: self.x_label,
+            y_label: self.label,
+            x_lines: 8.0,
+            y_lines: (f64::from(self.height) / 40.0).max(4.0),
+        };
         let plot = Plot::new(self.id)
             .height(self.height.max(1.0))
             .allow_drag(false)
@@ -116,32 +156,38 @@ impl TimePlot<'_> {
         let shown = plot.show(ui, |plot_ui| {
             plot_ui.set_plot_bounds_x(range[0]..=range[1]);
             plot_ui.set_plot_bounds_y(y_range[0]..=y_range[1]);
-            for (number, piece) in visible.pieces.iter().enumerate() {
-                plot_ui.line(
-                    Line::new(self.id, PlotPoints::Borrowed(piece))
-                        .id((self.id, number))
-                        .color(self.color)
-                        .width(1.3)
-                        .allow_band(false)
-                        .allow_hover(false),
-                );
+            for (number, (color, visible)) in drawn.iter().enumerate() {
+                for (part, piece) in visible.pieces.iter().enumerate() {
+                    plot_ui.line(
+                        Line::new(self.id, PlotPoints::Borrowed(piece))
+                            .id((self.id, number, part))
+                            .color(*color)
+                            .width(1.3)
+                            .allow_band(false)
+                            .allow_hover(false),
+                    );
+                }
             }
+            beside(plot_ui);
         });
-        (shown.response, shown.transform)
+        (shown, statistics)
     }
 }
 
-/// A vertical range with a margin, never empty, centred on the data.
-fn y_range(statistics: Option<RangeStatistics>, min_span: f64) -> [f64; 2] {
-    let (low, high) = statistics.map_or((0.0, 0.0), |s| (s.min, s.max));
+/// A vertical range with a margin, never empty, centred on all curves.
+fn y_range(curves: &[Option<RangeStatistics>], min_span: f64) -> [f64; 2] {
+    let ends = curves.iter().flatten().map(|s| [s.min, s.max]);
+    let ends = ends.reduce(|all, one| [all[0].min(one[0]), all[1].max(one[1])]);
+    let [low, high] = ends.unwrap_or([0.0, 0.0]);
     let center = 0.5 * low + 0.5 * high;
     let half = (0.55 * (high - low)).max(0.5 * min_span).max(1e-6 * center.abs());
     [center - half, center + half]
 }
 
-fn interact(ui: &Ui, response: &Response, transform: egui_plot::PlotTransform, view: &mut TimeView) {
+fn interact(ui: &Ui, shown: &PlotResponse<()>, view: &mut TimeView, may_pan: bool) {
+    let PlotResponse { response, transform, .. } = shown;
     let per_point = view.span / f64::from(transform.frame().width().max(1.0));
-    if response.dragged() {
+    if response.dragged() && may_pan {
         view.pan(-f64::from(response.drag_delta().x) * per_point);
     }
     if response.double_clicked() {

@@ -2,115 +2,17 @@
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests, where a panic is the report")]
 
-use std::path::PathBuf;
-use std::time::{Duration, Instant};
+mod common;
 
+use std::time::Duration;
+
+use common::{ROBOT, SIZE, TempFile, Window, click, enter, open, options, random_input, state, until, wheel};
 use egui::accesskit::Role;
-use egui::{Event, Key, Modifiers, PointerButton, Pos2, Vec2, vec2};
-use egui_kittest::{Harness, kittest::Queryable};
+use egui::{Event, Key, Modifiers, Pos2, Vec2, vec2};
+use egui_kittest::kittest::Queryable;
 use flqr_core::model_file::{AxisModel, Model, Rig, presets};
-use flqr_gui::{App, Tab, WindowOptions};
+use flqr_gui::{Tab, WindowOptions};
 use serde_json::Value;
-
-/// A robot with weights of its own, so that these tests don't depend on what a preset chooses.
-const ROBOT: &str = r#"
-name = "Test robot"
-[robot]
-body_mass_kg = 13.0
-wheel_mass_kg = 1.0
-wheel_inertia_kg_m2 = 0.005
-wheel_radius_m = 0.1
-com_height_m = 0.25
-body_inertia_kg_m2 = 0.25
-[friction.left]
-coulomb_nm = 0.0338
-static_nm = 0.0761
-viscous_nm_s_rad = 0.00049
-stribeck_speed_rad_s = 1.612
-stribeck_exponent = 0.231
-offset_nm = -0.0016
-[lqr]
-q_diagonal = [60.0, 30.0, 100.0, 5.0]
-r_diagonal = [20.0, 20.0]
-"#;
-const SIZE: Vec2 = vec2(1280.0, 800.0);
-
-/// The app is made in the first frame, because it needs the context.
-type Window = Harness<'static, Option<App>>;
-
-fn options(tab: Tab) -> WindowOptions {
-    let model = Model::from_toml(ROBOT, "test.toml").unwrap();
-    WindowOptions { tab, paused: true, recent_file: None, ..WindowOptions::new(model) }
-}
-
-fn open(options: WindowOptions, size: Vec2) -> Window {
-    let mut window = Harness::builder().with_size(size).build_ui_state(
-        move |ui: &mut egui::Ui, app: &mut Option<App>| {
-            let app = app.get_or_insert_with(|| App::new(options.clone(), ui.ctx()).unwrap());
-            app.logic(ui.ctx());
-            app.ui(ui);
-        },
-        None,
-    );
-    window.run_steps(3);
-    window
-}
-
-fn state(window: &Window) -> Value {
-    window.state().as_ref().unwrap().snapshot()
-}
-
-/// Frames until `done` holds of the window's state; workers get their time between them.
-fn until(window: &mut Window, what: &str, done: impl Fn(&Value) -> bool) -> Value {
-    let start = Instant::now();
-    loop {
-        window.step();
-        let state = state(window);
-        if done(&state) {
-            return state;
-        }
-        assert!(start.elapsed() < Duration::from_secs(120), "{what} did not happen: {state:#}");
-        std::thread::sleep(Duration::from_millis(2));
-    }
-}
-
-/// Types over what a field holds.
-fn enter(window: &mut Window, label: &str, text: &str) {
-    window.get_by_label(label).click();
-    window.run_steps(2);
-    window.key_press_modifiers(Modifiers::COMMAND, Key::A);
-    window.step();
-    window.event(Event::Text(text.to_owned()));
-    window.step();
-    window.key_press(Key::Enter);
-    window.run_steps(3);
-}
-
-fn click(window: &mut Window, label: &str) {
-    window.get_by_label(label).click();
-    window.run_steps(3);
-}
-
-/// A file that is removed with the test.
-struct TempFile(PathBuf);
-
-impl TempFile {
-    fn new(name: &str, text: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("flqr-gui-{}-{name}", std::process::id()));
-        std::fs::write(&path, text).unwrap();
-        Self(path)
-    }
-
-    fn name(&self) -> &str {
-        self.0.to_str().unwrap()
-    }
-}
-
-impl Drop for TempFile {
-    fn drop(&mut self) {
-        std::fs::remove_file(&self.0).ok();
-    }
-}
 
 /// Pairs on a curve that is quick to fit, with a small, regular deviation.
 fn pairs_csv() -> String {
@@ -582,58 +484,19 @@ fn gaps_are_drawn_zoomed_out_and_in() {
     }
 }
 
-fn wheel(window: &Window, delta: f32) {
-    window.event(Event::MouseWheel {
-        unit: egui::MouseWheelUnit::Point,
-        delta: vec2(0.0, delta),
-        phase: egui::TouchPhase::Move,
-        source: egui::MouseWheelSource::Unknown,
-        modifiers: Modifiers::NONE,
-    });
-}
-
 #[test]
 fn every_page_survives_any_size() {
-    for tab in [Tab::Tune, Tab::Friction] {
+    for tab in [Tab::Tune, Tab::Friction, Tab::Experiments] {
         for size in [Vec2::ZERO, vec2(1.0, 1.0), vec2(300.0, 200.0), vec2(1920.0, 1080.0)] {
             open(options(tab), size).run_steps(3);
         }
     }
 }
 
-/// A tiny generator: the same events in every run.
-fn next(seed: &mut u64) -> u64 {
-    *seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-    *seed >> 33
-}
-
 #[test]
 fn a_hundred_frames_of_random_input_do_no_harm() {
-    for (tab, mut seed) in [(Tab::Tune, 1), (Tab::Friction, 2)] {
-        let mut window = open(WindowOptions { paused: false, ..options(tab) }, SIZE);
-        for _ in 0..100 {
-            let position = Pos2::new((next(&mut seed) % 1280) as f32, (next(&mut seed) % 800) as f32);
-            window.hover_at(position);
-            match next(&mut seed) % 6 {
-                0 => {
-                    for pressed in [true, false] {
-                        let button = PointerButton::Primary;
-                        let modifiers = Modifiers::NONE;
-                        window.event(Event::PointerButton { pos: position, button, pressed, modifiers });
-                    }
-                }
-                1 => window.drag_at(position),
-                2 => window.drop_at(position),
-                3 => wheel(&window, (next(&mut seed) % 600) as f32 - 300.0),
-                4 => window
-                    .event(Event::Text(["7", "-", "e", ".", "−"][(next(&mut seed) % 5) as usize].into())),
-                _ => {
-                    let keys = [Key::Tab, Key::Enter, Key::ArrowUp, Key::Backspace, Key::Escape, Key::Num2];
-                    window.key_press(keys[(next(&mut seed) % 6) as usize]);
-                }
-            }
-            window.step();
-        }
+    for (tab, seed) in [(Tab::Tune, 1), (Tab::Friction, 2)] {
+        random_input(&mut open(WindowOptions { paused: false, ..options(tab) }, SIZE), seed);
     }
 }
 

@@ -7,7 +7,8 @@ use egui::{ComboBox, RichText, Ui};
 use crate::command::Command;
 use crate::context::ViewContext;
 use crate::history::{Channel, HISTORY_S};
-use crate::plot::{Curve, DecimationCache, RangeStatistics, TimePlot, TimeView};
+use crate::plot::{Curve, DecimationCache, RangeStatistics, TimeCurve, TimePlot, TimeView};
+use crate::quantity::{Quantity, to_scale};
 use crate::theme::palette;
 use crate::widgets::{choice_ui, error_ui, mono, number_ui, warning_ui};
 
@@ -129,8 +130,7 @@ impl LivePlots {
             let last = index == 2;
             let plot = TimePlot {
                 id: quantity.name,
-                label: &format!("{} [{}]", quantity.name, quantity.unit),
-                color: colors[index],
+                label: &quantity.label(),
                 height: if last { height + TIME_AXIS_HEIGHT } else { height },
                 x_label: last.then_some("time [s]"),
                 min_y_span: quantity.min_span,
@@ -138,38 +138,16 @@ impl LivePlots {
             let curve =
                 Curve { x: history.time_s(), y: history.channel(channel), scale: quantity.scale, gap: GAP_S };
             let (view, cache) = (&mut self.view, &mut self.caches[index]);
+            let (color, generation) = (colors[index], history.generation());
             ui.horizontal_top(|ui| {
                 let width = (ui.available_width() - STATISTICS_WIDTH).max(1.0);
                 let statistics = ui
                     .allocate_ui(egui::vec2(width, plot.height), |ui| {
-                        plot.show(ui, view, cache, curve, history.generation())
+                        plot.show(ui, view, &mut [TimeCurve { color, curve, generation, cache }])
                     })
                     .inner;
-                ui.vertical(|ui| statistics_ui(ui, &quantity, statistics));
+                ui.vertical(|ui| statistics_ui(ui, &quantity, statistics[0]));
             });
-        }
-    }
-}
-
-/// How a channel is shown.
-struct Quantity {
-    name: &'static str,
-    unit: &'static str,
-    scale: f64,
-    min_span: f64,
-}
-
-impl Quantity {
-    fn of(channel: Channel, degrees: bool) -> Self {
-        match (channel, degrees) {
-            (Channel::Displacement, _) => {
-                Self { name: "displacement", unit: "m", scale: 1.0, min_span: 0.02 }
-            }
-            (Channel::Velocity, _) => Self { name: "velocity", unit: "m/s", scale: 1.0, min_span: 0.04 },
-            (Channel::Pitch, true) => {
-                Self { name: "pitch", unit: "°", scale: 1.0_f64.to_degrees(), min_span: 0.4 }
-            }
-            (Channel::Pitch, false) => Self { name: "pitch", unit: "rad", scale: 1.0, min_span: 0.007 },
         }
     }
 }
@@ -194,7 +172,7 @@ fn run_ui(context: &ViewContext<'_>, ui: &mut Ui) {
 fn statistics_ui(ui: &mut Ui, quantity: &Quantity, statistics: Option<RangeStatistics>) {
     ui.spacing_mut().item_spacing.y = 2.0;
     ui.add_space(6.0);
-    ui.label(RichText::new(format!("{} [{}]", quantity.name, quantity.unit)).small().weak());
+    ui.label(RichText::new(quantity.label()).small().weak());
     let rows = statistics.map_or([("mean", f64::NAN), ("std", f64::NAN), ("p-p", f64::NAN)], |s| {
         [("mean", s.mean), ("std", s.std), ("p-p", s.peak_to_peak())]
     });
@@ -208,13 +186,4 @@ fn statistics_ui(ui: &mut Ui, quantity: &Quantity, statistics: Option<RangeStati
         let text = format!("{name:<4}{:>10}", to_scale(value, peak_to_peak));
         ui.label(mono(text)).on_hover_text(help);
     }
-}
-
-/// `value` with the decimals that make three digits of `scale`, so that numbers below each other compare.
-fn to_scale(value: f64, scale: f64) -> String {
-    if !value.is_finite() {
-        return "–".to_owned();
-    }
-    let decimals = if scale > 0.0 { (2.0 - scale.log10().floor()).clamp(0.0, 7.0) as usize } else { 3 };
-    format!("{value:.decimals$}").replace('-', "−")
 }

@@ -62,7 +62,7 @@ impl TuneTab {
     }
 
     pub(crate) fn note_dialog_problem(&mut self, purpose: FilePurpose, problem: &str) {
-        if purpose != FilePurpose::OpenLog {
+        if matches!(purpose, FilePurpose::OpenModel | FilePurpose::SaveModel) {
             self.note_file_problem(problem);
         }
     }

@@ -1,0 +1,394 @@
+//! The *Experiments* page: what to run at the left, both runs' plots in the middle, the robot and the statistics
+//! at the right.
+
+mod dials;
+mod form;
+mod playback;
+mod plots;
+mod preflight;
+mod report;
+mod run;
+mod runs;
+mod save;
+mod scene;
+mod side_view;
+mod signals;
+mod table;
+
+use std::path::PathBuf;
+
+use egui::{
+    CentralPanel, Color32, Context, Frame, Margin, Panel, Rect, RichText, ScrollArea, Ui, Vec2, vec2,
+};
+use flqr_core::model_file::{Model, RobotModel};
+use flqr_core::simulate::Summary;
+
+use crate::command::FilePurpose;
+use crate::context::ViewContext;
+use crate::job::Waker;
+use crate::plot::Marks;
+use crate::theme::palette;
+use crate::widgets::{choice_ui, error_ui, hint_ui, section_ui, warning_ui};
+use dials::{Dials, GREATEST_HEIGHT};
+use playback::Playback;
+use plots::Plots;
+use preflight::Preflight;
+use run::{Settings, Variant};
+use runs::{Comparison, Runs};
+pub(crate) use save::SavedAs;
+use save::{Extent, Saver};
+use side_view::{SideView, subject};
+use table::{Choice, StatisticsTable};
+
+/// A step of the target is shown over its first seconds: the rest is the steady state.
+const STEP_VIEW_S: f64 = 2.0;
+
+/// State of the page.
+pub(crate) struct ExperimentsTab {
+    /// What the next runs are made with.
+    settings: Settings,
+    preflight: Preflight,
+    runs: Runs,
+    plots: Plots,
+    marks: Marks,
+    playback: Playback,
+    table: StatisticsTable,
+    saver: Saver,
+    degrees: bool,
+    /// Where plots, robot and statistics were drawn.
+    page: Rect,
+    /// Height of the statistics when they were drawn last.
+    table_height: f32,
+}
+
+impl Default for ExperimentsTab {
+    fn default() -> Self {
+        Self {
+            settings: Settings::default(),
+            preflight: Preflight::default(),
+            runs: Runs::default(),
+            plots: Plots::default(),
+            marks: Marks::new([0.0, 0.0]),
+            playback: Playback::default(),
+            table: StatisticsTable::default(),
+            saver: Saver::default(),
+            degrees: false,
+            page: Rect::NOTHING,
+            table_height: 290.0,
+        }
+    }
+}
+
+impl ExperimentsTab {
+    /// Starts both runs on `model`, which `path` holds if it is saved.
+    pub(crate) fn start(&mut self, model: Model, path: Option<PathBuf>, waker: &Waker) -> Result<(), String> {
+        self.runs
+            .start(&self.settings, model, path, waker)
+            .map_err(|error| format!("No thread for the runs: {error}."))
+    }
+
+    /// Saves the runs that are shown.
+    pub(crate) fn save(
+        &mut self,
+        saved_as: SavedAs,
+        path: PathBuf,
+        replace: bool,
+        ctx: &Context,
+        waker: &Waker,
+    ) -> Result<(), String> {
+        let Some(comparison) = self.runs.comparison() else {
+            return Err("There is no run to save: run an experiment first.".to_owned());
+        };
+        let visible_s = self.plots.view.range();
+        let extent = Extent { range_s: self.table.range(comparison, visible_s), visible_s };
+        self.saver.start(comparison, extent, (saved_as, path, replace), self.page, ctx, waker)
+    }
+
+    /// Name that a dialog offers.
+    pub(crate) fn suggested_name(&self, saved_as: SavedAs) -> String {
+        format!("{}.{}", self.settings.scenario.name(), saved_as.extension())
+    }
+
+    /// Goes to the path to save to.
+    pub(crate) fn focus_path(&mut self) {
+        self.saver.focus_path = true;
+    }
+
+    pub(crate) fn note_dialog_problem(&mut self, purpose: FilePurpose, problem: &str) {
+        if matches!(purpose, FilePurpose::SaveExperiment(_)) {
+            self.saver.problem = Some(problem.to_owned());
+        }
+    }
+
+    /// A sentence when something was saved, or could not be.
+    pub(crate) fn drain_saver(&mut self, waker: &Waker) -> Option<Result<String, String>> {
+        self.saver.drain(waker)
+    }
+
+    pub(crate) fn cancel(&self) {
+        self.runs.cancel();
+    }
+
+    pub(crate) fn is_running(&self) -> bool {
+        self.runs.is_running()
+    }
+
+    /// Takes in what the workers have brought; a sentence if something ended.
+    pub(crate) fn drain(&mut self) -> Option<String> {
+        let generation = |runs: &Runs| runs.comparison().map(|comparison| comparison.generation);
+        let before = generation(&self.runs);
+        let message = self.runs.drain();
+        if generation(&self.runs) != before
+            && let Some(comparison) = self.runs.comparison()
+        {
+            let limits = [0.0, comparison.end_s()];
+            self.marks = Marks::new(limits);
+            let step = comparison.recorded().any(|(_, run)| run.tracking().is_some());
+            let shown_s = if step { STEP_VIEW_S.min(limits[1]) } else { limits[1] };
+            self.plots.view.show_all([0.0, shown_s]);
+            self.table.choice = match self.table.choice {
+                Choice::Chosen(_) => Choice::Usual,
+                other => other,
+            };
+            self.playback.playing = false;
+        }
+        message
+    }
+
+    /// Lets the time run while it plays.
+    pub(crate) fn advance(&mut self, ctx: &Context) {
+        self.playback.advance(ctx, &mut self.marks);
+    }
+
+    /// What the page shows, as `--state-out` writes it.
+    pub(crate) fn snapshot(&self) -> serde_json::Value {
+        let runs = self.runs.comparison().map(|comparison| {
+            let range = self.table.range(comparison, self.plots.view.range());
+            let found = comparison.statistics_between(range);
+            let runs = Variant::ALL.iter().zip(&comparison.runs).zip(found);
+            runs.map(|((variant, run), statistics)| snapshot_of(comparison, *variant, run, statistics))
+                .collect::<Vec<_>>()
+        });
+        serde_json::json!({
+            "scenario": self.settings.scenario.name(),
+            "seconds": self.settings.seconds,
+            "seed": self.settings.seed,
+            "running": self.is_running(),
+            "runs": runs.unwrap_or_default(),
+            "range_s": self.runs.comparison().map(|_| self.marks.range),
+            "cursor_s": self.marks.cursor,
+            "playing": self.playback.playing,
+        })
+    }
+
+    pub(crate) fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
+        self.playback.keys(ui, &mut self.marks);
+        let side = Frame::side_top_panel(ui.style()).inner_margin(Margin::symmetric(10, 6));
+        Panel::left("experiment")
+            .frame(side)
+            .resizable(true)
+            .default_size(270.0)
+            .size_range(240.0..=420.0)
+            .show(ui, |ui| {
+                ScrollArea::vertical().show(ui, |ui| {
+                    form::ui(context, &mut self.settings, &mut self.preflight, &self.runs, ui);
+                    self.outcome_ui(context, ui);
+                    if self.runs.comparison().is_some() {
+                        self.saver.ui(context, ui);
+                    }
+                });
+            });
+        if let Some(comparison) = self.runs.comparison().cloned() {
+            self.marks.range = self.table.range(&comparison, self.plots.view.range());
+            self.marks.shade = self.table.choice != Choice::Visible && self.marks.range != self.marks.limits;
+            self.page = ui.available_rect_before_wrap();
+            let width = (0.29 * ui.ctx().content_rect().width()).clamp(372.0, 560.0);
+            Panel::right("robot")
+                .frame(side)
+                .resizable(true)
+                .default_size(width)
+                .size_range(300.0..=900.0)
+                .show(ui, |ui| {
+                    let height = ui.available_height();
+                    ScrollArea::vertical().show(ui, |ui| self.robot_ui(&comparison, ui, height));
+                });
+            let middle = Frame::central_panel(ui.style()).inner_margin(Margin::symmetric(10, 6));
+            CentralPanel::default().frame(middle).show(ui, |ui| self.plots_ui(&comparison, ui));
+        } else {
+            CentralPanel::default().show(ui, empty_ui);
+        }
+    }
+
+    /// Falls, warnings and refusals of the last runs, and whether they are still those of the form.
+    fn outcome_ui(&self, context: &ViewContext<'_>, ui: &mut Ui) {
+        let Some(comparison) = self.runs.comparison() else { return };
+        if comparison.settings != self.settings {
+            hint_ui(ui, "The plots show runs with other settings: run again for these.");
+        } else if comparison.model.rig != context.session.model_in_use().rig {
+            warning_ui(ui, "The model was changed after these runs: run again to see what that does.");
+        }
+        for (title, sentence) in comparison.failures() {
+            let sentence = format!("{title}: {sentence}");
+            if !self.preflight.says(&sentence) {
+                error_ui(ui, sentence);
+            }
+        }
+        for (titles, warning) in comparison.warnings() {
+            // What is said before the next run need not be said of the last one.
+            if !self.preflight.says(&warning) {
+                warning_ui(ui, format!("{titles}: {warning}."));
+            }
+        }
+        commands_ui(comparison, ui);
+    }
+
+    fn robot_ui(&mut self, comparison: &Comparison, ui: &mut Ui, room: f32) {
+        let count = comparison.recorded().count().max(1) as f32;
+        let spacing = ui.spacing().item_spacing.y;
+        let height = ((room - self.table_height) / count - spacing).clamp(96.0, 420.0);
+        let size = vec2(ui.available_width(), height);
+        match comparison.model.robot() {
+            Some(robot) if comparison.settings.scenario.on_ground() => {
+                side_views_ui(comparison, robot, self.marks.cursor, ui, size);
+            }
+            _ => dials_ui(comparison, self.marks.cursor, ui, size.min(vec2(size.x, GREATEST_HEIGHT))),
+        }
+        let tables = ui.scope(|ui| {
+            table::tracking_ui(ui, comparison);
+            self.table.ui(ui, comparison, self.degrees, &self.marks);
+        });
+        self.table_height = tables.response.rect.height() + spacing;
+    }
+
+    fn plots_ui(&mut self, comparison: &Comparison, ui: &mut Ui) {
+        ui.horizontal(|ui| self.head_ui(comparison, ui));
+        let transport = ui.spacing().interact_size.y + ui.spacing().item_spacing.y;
+        let size = vec2(ui.available_width(), (ui.available_height() - transport).max(1.0));
+        let moved = ui.allocate_ui(size, |ui| {
+            ui.set_min_height(size.y);
+            self.plots.ui(ui, comparison, self.degrees, &mut self.marks)
+        });
+        if moved.inner.cursor {
+            self.playback.playing = false;
+        }
+        if moved.inner.range {
+            self.table.choice = Choice::Chosen(self.marks.range);
+        }
+        self.playback.ui(ui, &mut self.marks);
+    }
+
+    fn head_ui(&mut self, comparison: &Comparison, ui: &mut Ui) {
+        let settings = &comparison.settings;
+        ui.label(RichText::new(settings.scenario.title()).heading().strong());
+        let colors = palette(ui.visuals());
+        for (variant, _) in comparison.recorded() {
+            legend_ui(ui, variant.title(settings.scenario), colors.runs[variant as usize]);
+        }
+        if comparison.signals(self.degrees).iter().any(|signal| signal.has_target) {
+            legend_ui(ui, "target", colors.reference);
+        }
+        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+            if settings.scenario.on_ground() {
+                ui.scope(|ui| {
+                    let choices = [(true, "deg", "Pitch in degrees"), (false, "rad", "Pitch in radians")];
+                    choice_ui(ui, &mut self.degrees, &choices);
+                });
+            }
+            if ui.button("Whole run").on_hover_text("Show the run from start to end (double click)").clicked()
+            {
+                self.plots.view.show_all(self.marks.limits);
+            }
+        });
+    }
+}
+
+fn legend_ui(ui: &mut Ui, name: &str, color: Color32) {
+    let (rect, _) = ui.allocate_exact_size(vec2(18.0, 12.0), egui::Sense::hover());
+    ui.painter().hline(rect.x_range(), rect.center().y, egui::Stroke::new(2.5, color));
+    ui.label(RichText::new(name).strong().color(color));
+}
+
+fn side_views_ui(comparison: &Comparison, robot: &RobotModel, time_s: f64, ui: &mut Ui, size: Vec2) {
+    let runs = comparison.recorded().map(|(_, run)| run);
+    let subject = subject(runs, &robot.parameters, robot.surroundings.slope_rad);
+    let grounds = comparison.settings.scenario.grounds(robot);
+    let colors = palette(ui.visuals()).runs;
+    for (variant, run) in comparison.recorded() {
+        let view = SideView {
+            title: variant.title(comparison.settings.scenario),
+            color: colors[variant as usize],
+            run,
+            grounds: &grounds,
+            parameters: &robot.parameters,
+            subject: &subject,
+            time_s,
+        };
+        view.ui(ui, size);
+    }
+}
+
+fn dials_ui(comparison: &Comparison, time_s: f64, ui: &mut Ui, size: Vec2) {
+    let signals = comparison.signals(false);
+    let speeds = signals.iter().enumerate().filter(|(_, signal)| signal.has_target);
+    let speeds: Vec<_> = speeds.map(|(column, signal)| (signal.quantity.name, column)).collect();
+    let colors = palette(ui.visuals()).runs;
+    for (variant, run) in comparison.recorded() {
+        let title = variant.title(comparison.settings.scenario);
+        let dials = Dials { title, color: colors[variant as usize], run, speeds: &speeds, time_s };
+        dials.ui(ui, size);
+    }
+}
+
+fn snapshot_of(
+    comparison: &Comparison,
+    variant: Variant,
+    run: &Result<Box<run::Recorded>, String>,
+    statistics: Option<Vec<Summary>>,
+) -> serde_json::Value {
+    let controller = variant.name(comparison.settings.scenario);
+    let run = match run {
+        Err(problem) => return serde_json::json!({ "controller": controller, "problem": problem }),
+        Ok(run) => run,
+    };
+    let keys = comparison.signals(false).into_iter().map(|signal| signal.key.to_owned());
+    let statistics = statistics.map(|all| {
+        keys.zip(all.into_iter().map(|s| serde_json::json!(s))).collect::<serde_json::Map<_, _>>()
+    });
+    serde_json::json!({
+        "controller": controller,
+        "statistics": statistics,
+        "settled": run.settled(),
+        "fell_s": run.fall().map(|fall| fall.time_s),
+        "tracking": run.tracking(),
+        "end_s": run.end_s(),
+        "warnings": run.warnings(),
+        "command": comparison.command_line(variant),
+    })
+}
+
+/// Copies the commands that make these runs again.
+fn commands_ui(comparison: &Comparison, ui: &mut Ui) {
+    section_ui(ui, "Command", |ui| {
+        for variant in Variant::ALL.into_iter().rev() {
+            let name = format!("Copy {}", variant.title(comparison.settings.scenario));
+            let line = comparison.command_line(variant);
+            if ui.button(name).on_hover_text(&line).clicked() {
+                ui.ctx().copy_text(line);
+            }
+        }
+    });
+    if comparison.model_path.is_none() {
+        hint_ui(ui, "No file holds the model of these runs: save it, put its path in place of MODEL.toml.");
+    }
+}
+
+fn empty_ui(ui: &mut Ui) {
+    ui.add_space(0.35 * ui.available_height());
+    ui.vertical_centered(|ui| {
+        ui.label("No run yet.");
+        hint_ui(
+            ui,
+            "Choose an experiment at the left and run it: both controllers appear here, side by side.",
+        );
+    });
+}

@@ -1,0 +1,391 @@
+//! Saving runs: as logs, as a picture of the page, as plots, as a report.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
+
+use eframe::icon_data::IconDataExt;
+use egui::{ColorImage, Context, IconData, Rect, TextEdit, Ui};
+use flqr_core::record::write_log;
+
+use super::report;
+use super::runs::Comparison;
+use crate::command::{Command, FilePurpose};
+use crate::context::ViewContext;
+use crate::job::{Job, Outcome, Waker};
+use crate::widgets::{choice_ui, error_ui, hint_ui, section_ui, warning_ui};
+use crate::write_file::write_file;
+
+/// A window system that has not brought a picture after this time never will.
+const LONGEST_WAIT: Duration = Duration::from_secs(5);
+
+/// What is saved.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum SavedAs {
+    /// CSV, one file a run and, in the air, a motor.
+    #[default]
+    Logs,
+    /// PNG of plots, robot and statistics as they are shown.
+    Picture,
+    /// SVG of the plots over the visible time.
+    Plots,
+    /// HTML with everything.
+    Report,
+}
+
+impl SavedAs {
+    const ALL: [Self; 4] = [Self::Logs, Self::Picture, Self::Plots, Self::Report];
+
+    /// Ending of the file.
+    pub(crate) fn extension(self) -> &'static str {
+        match self {
+            Self::Logs => "csv",
+            Self::Picture => "png",
+            Self::Plots => "svg",
+            Self::Report => "html",
+        }
+    }
+
+    /// Name for a dialog.
+    pub(crate) fn title(self) -> &'static str {
+        match self {
+            Self::Logs => "Save the runs as logs",
+            Self::Picture => "Save a picture of the page",
+            Self::Plots => "Save the plots",
+            Self::Report => "Save a report",
+        }
+    }
+}
+
+/// What is written, apart from the comparison.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Extent {
+    /// Of the statistics, s.
+    pub(super) range_s: [f64; 2],
+    /// Of the plots, s.
+    pub(super) visible_s: [f64; 2],
+}
+
+/// How a job of saving ended.
+#[derive(Debug)]
+enum Saved {
+    Written(Vec<PathBuf>),
+    /// A file is there already; nothing was written.
+    Exists(PathBuf),
+}
+
+/// A picture that was asked for.
+struct Shot {
+    path: PathBuf,
+    replace: bool,
+    asked: Instant,
+    image: Receiver<Arc<ColorImage>>,
+    page: Rect,
+    pixels_per_point: f32,
+}
+
+/// Form and jobs.
+#[derive(Default)]
+pub(super) struct Saver {
+    pub(super) saved_as: SavedAs,
+    path: String,
+    shot: Option<Shot>,
+    job: Option<Job<(), Result<Saved, String>>>,
+    /// What the running job would replace, and what it was asked with.
+    asked: Option<(SavedAs, PathBuf)>,
+    overwrite: Option<(SavedAs, PathBuf)>,
+    pub(super) problem: Option<String>,
+    pub(super) focus_path: bool,
+}
+
+impl Saver {
+    fn is_busy(&self) -> bool {
+        self.shot.is_some() || self.job.is_some()
+    }
+
+    /// Starts saving; an existing file is replaced only if `replace`.
+    pub(super) fn start(
+        &mut self,
+        comparison: &Arc<Comparison>,
+        extent: Extent,
+        (saved_as, path, replace): (SavedAs, PathBuf, bool),
+        page: Rect,
+        ctx: &Context,
+        waker: &Waker,
+    ) -> Result<(), String> {
+        if self.is_busy() {
+            return Err("A file is still being written: try again when that has ended.".to_owned());
+        }
+        let path = with_ending(path, saved_as);
+        self.path = path.display().to_string();
+        self.saved_as = saved_as;
+        self.problem = None;
+        self.overwrite = None;
+        self.asked = Some((saved_as, path.clone()));
+        if saved_as == SavedAs::Picture {
+            let pixels_per_point = ctx.pixels_per_point();
+            let image = ask_for_picture(ctx);
+            self.shot = Some(Shot { path, replace, asked: Instant::now(), image, page, pixels_per_point });
+            return Ok(());
+        }
+        let comparison = Arc::clone(comparison);
+        self.write(waker, replace, move || files(saved_as, &path, &comparison, extent))
+    }
+
+    fn write(
+        &mut self,
+        waker: &Waker,
+        replace: bool,
+        files: impl FnOnce() -> Result<Vec<(PathBuf, Vec<u8>)>, String> + Send + 'static,
+    ) -> Result<(), String> {
+        let job = Job::start("save-experiment", waker, move |_| write_all(files()?, replace));
+        self.job = Some(job.map_err(|error| format!("No thread to write the file: {error}."))?);
+        Ok(())
+    }
+
+    /// A sentence when something was written, or could not be.
+    pub(super) fn drain(&mut self, waker: &Waker) -> Option<Result<String, String>> {
+        if let Some(shot) = self.shot.take() {
+            match shot.image.try_recv() {
+                Ok(image) => {
+                    let Shot { path, replace, page, pixels_per_point, .. } = shot;
+                    let png = move || Ok(vec![(path, png(&image, page, pixels_per_point)?)]);
+                    if let Err(problem) = self.write(waker, replace, png) {
+                        return Some(Err(problem));
+                    }
+                }
+                Err(_) if shot.asked.elapsed() > LONGEST_WAIT => {
+                    return Some(Err("The window system brought no picture of the page.".to_owned()));
+                }
+                Err(_) => self.shot = Some(shot),
+            }
+        }
+        let result = match self.job.as_mut()?.poll().1 {
+            Outcome::Running => return None,
+            Outcome::Done(result) => result,
+            Outcome::Broken => Err("Writing the file failed: this is a defect of flqr.".to_owned()),
+        };
+        self.job = None;
+        Some(match result {
+            Ok(Saved::Written(paths)) => {
+                let names: Vec<_> = paths.iter().map(|path| path.display().to_string()).collect();
+                Ok(format!("Saved {}.", names.join(", ")))
+            }
+            Ok(Saved::Exists(path)) => {
+                self.overwrite = self.asked.take();
+                Ok(format!("{} exists and was not replaced.", path.display()))
+            }
+            Err(problem) => {
+                self.problem = Some(problem.clone());
+                Err(problem)
+            }
+        })
+    }
+
+    pub(super) fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
+        section_ui(ui, "Save", |_| {});
+        ui.scope(|ui| {
+            let choices = [
+                (SavedAs::Logs, "Logs", "CSV as every command reads it: one file a run"),
+                (SavedAs::Picture, "Picture", "PNG of plots, robot and statistics as they are shown"),
+                (SavedAs::Plots, "Plots", "SVG of the plots over the visible time"),
+                (SavedAs::Report, "Report", "HTML with plots, statistics, model and commands"),
+            ];
+            ui.horizontal(|ui| {
+                if choice_ui(ui, &mut self.saved_as, &choices) {
+                    self.overwrite = None;
+                    self.problem = None;
+                    if !self.path.trim().is_empty() {
+                        let path = with_ending(self.path.trim().into(), self.saved_as);
+                        self.path = path.display().to_string();
+                    }
+                }
+            });
+        });
+        let field = TextEdit::singleline(&mut self.path)
+            .hint_text(format!("path, .{}", self.saved_as.extension()))
+            .desired_width(f32::INFINITY);
+        let field = ui.add(field).accessible_name("path to save to");
+        let entered = field.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
+        if std::mem::take(&mut self.focus_path) {
+            field.request_focus();
+        }
+        if field.changed() {
+            self.overwrite = None;
+            self.saved_as = known_ending(Path::new(self.path.trim())).unwrap_or(self.saved_as);
+        }
+        field.on_hover_text("The ending says what is saved: .csv, .png, .svg or .html (Ctrl+L comes here)");
+        ui.horizontal(|ui| self.buttons_ui(context, ui, entered));
+        if self.saved_as == SavedAs::Logs {
+            hint_ui(ui, "Names of the controllers are added to the file's name.");
+        }
+        if let Some(problem) = &self.problem {
+            error_ui(ui, problem);
+        }
+        self.overwrite_ui(context, ui);
+    }
+
+    fn buttons_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui, entered: bool) {
+        let ready = !self.path.trim().is_empty() && !self.is_busy();
+        let save = ui.add_enabled(ready, egui::Button::new("Save runs"));
+        let save =
+            save.on_hover_text("Save to the path above; an existing file is replaced after a question");
+        if save.clicked() || (entered && ready) {
+            let path = PathBuf::from(self.path.trim());
+            context.commands.send(Command::SaveExperiment { saved_as: self.saved_as, path, replace: false });
+        }
+        if ui.button("Choose…").on_hover_text("Choose where to save").clicked() {
+            context.commands.send(Command::ShowDialog(FilePurpose::SaveExperiment(self.saved_as)));
+        }
+    }
+
+    fn overwrite_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
+        let Some((saved_as, path)) = self.overwrite.take() else { return };
+        warning_ui(ui, format!("Replace {}?", path.display()));
+        let answer = ui.horizontal(|ui| {
+            let replace = ui.button("Replace").on_hover_text("Replace what is there");
+            (replace.clicked(), ui.button("Keep").on_hover_text("Leave what is there").clicked())
+        });
+        match answer.inner {
+            (true, _) => {
+                context.commands.send(Command::SaveExperiment { saved_as, path, replace: true });
+            }
+            (_, true) => {}
+            _ => self.overwrite = Some((saved_as, path)),
+        }
+    }
+}
+
+/// What a path's ending says is saved.
+fn known_ending(path: &Path) -> Option<SavedAs> {
+    let ending = path.extension()?.to_string_lossy().to_lowercase();
+    SavedAs::ALL.into_iter().find(|saved_as| saved_as.extension() == ending)
+}
+
+/// The ending follows what is saved; a name may have other points in it.
+fn with_ending(path: PathBuf, saved_as: SavedAs) -> PathBuf {
+    if known_ending(&path).is_some() {
+        return path.with_extension(saved_as.extension());
+    }
+    let mut name = path.into_os_string();
+    name.push(".");
+    name.push(saved_as.extension());
+    name.into()
+}
+
+fn ask_for_picture(ctx: &Context) -> Receiver<Arc<ColorImage>> {
+    let (sender, receiver) = channel();
+    let wake = ctx.clone();
+    ctx.request_screenshot(move |image| {
+        // An error means that the window no longer waits for it.
+        sender.send(image).ok();
+        wake.request_repaint();
+    });
+    // So that the wait ends by itself.
+    ctx.request_repaint_after(LONGEST_WAIT + Duration::from_millis(100));
+    receiver
+}
+
+/// What goes where.
+fn files(
+    saved_as: SavedAs,
+    path: &Path,
+    comparison: &Comparison,
+    extent: Extent,
+) -> Result<Vec<(PathBuf, Vec<u8>)>, String> {
+    let one = |text: String| vec![(path.to_owned(), text.into_bytes())];
+    Ok(match saved_as {
+        SavedAs::Logs => logs(path, comparison)?,
+        SavedAs::Plots => one(report::chart(comparison, extent.visible_s).to_svg()),
+        SavedAs::Report => one(report::document(comparison, extent.range_s).to_html()),
+        SavedAs::Picture => Vec::new(),
+    })
+}
+
+fn logs(path: &Path, comparison: &Comparison) -> Result<Vec<(PathBuf, Vec<u8>)>, String> {
+    let mut files = Vec::new();
+    for (variant, run) in comparison.recorded() {
+        for (suffix, log) in run.logs() {
+            let mut text = Vec::new();
+            write_log(&log, &mut text).map_err(|error| format!("the log has no text: {error}"))?;
+            let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            let name = format!("{stem}-{}{suffix}", variant.name(comparison.settings.scenario));
+            let extension = path.extension().unwrap_or_default();
+            files.push((path.with_file_name(name).with_extension(extension), text));
+        }
+    }
+    Ok(files)
+}
+
+fn write_all(files: Vec<(PathBuf, Vec<u8>)>, replace: bool) -> Result<Saved, String> {
+    if !replace && let Some((path, _)) = files.iter().find(|(path, _)| path.symlink_metadata().is_ok()) {
+        return Ok(Saved::Exists(path.clone()));
+    }
+    let mut written = Vec::new();
+    for (path, content) in files {
+        write_file(&path, &content).map_err(|error| {
+            format!(
+                "{} could not be saved: {error}; check the folder, its permissions and the space on the disk",
+                path.display()
+            )
+        })?;
+        written.push(path);
+    }
+    Ok(Saved::Written(written))
+}
+
+/// The page's part of a picture of the window, as PNG.
+fn png(image: &ColorImage, page: Rect, pixels_per_point: f32) -> Result<Vec<u8>, String> {
+    let whole = egui::vec2(image.width() as f32, image.height() as f32) / pixels_per_point;
+    let part = page.intersect(Rect::from_min_size(egui::Pos2::ZERO, whole));
+    let part = if part.is_positive() {
+        image.region(&part, Some(pixels_per_point))
+    } else {
+        image.region_by_pixels([0, 0], image.size)
+    };
+    let rgba = part.pixels.iter().flat_map(egui::Color32::to_srgba_unmultiplied).collect();
+    let picture = IconData { rgba, width: part.width() as u32, height: part.height() as u32 };
+    picture.to_png_bytes().map_err(|error| format!("the picture could not be encoded: {error}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use egui::{Color32, pos2};
+
+    use super::*;
+
+    #[test]
+    fn the_picture_is_the_pages_part_of_the_window() {
+        let pixels = (0..12).map(|i| Color32::from_gray(20 * i)).collect();
+        let image = ColorImage::new([4, 3], pixels);
+        let page = Rect::from_min_max(pos2(1.0, 0.5), pos2(2.0, 9.0));
+        let read = eframe::icon_data::from_png_bytes(&png(&image, page, 2.0).unwrap()).unwrap();
+        assert_eq!((read.width, read.height), (2, 2));
+        assert_eq!(read.rgba.chunks(4).map(|c| c[0]).collect::<Vec<_>>(), [120, 140, 200, 220]);
+        let nowhere = Rect::from_min_max(pos2(50.0, 50.0), pos2(60.0, 60.0));
+        assert_eq!(eframe::icon_data::from_png_bytes(&png(&image, nowhere, 2.0).unwrap()).unwrap().width, 4);
+    }
+
+    #[test]
+    fn the_ending_is_that_of_what_is_saved() {
+        for (name, expected) in [("a", "a.svg"), ("a.CSV", "a.svg"), ("a.svg", "a.svg"), ("a.v2", "a.v2.svg")]
+        {
+            assert_eq!(with_ending(name.into(), SavedAs::Plots), PathBuf::from(expected));
+        }
+    }
+
+    #[test]
+    fn nothing_is_written_where_one_of_several_files_exists() {
+        let folder = std::env::temp_dir().join(format!("flqr-save-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let [first, second] = ["a.csv", "b.csv"].map(|name| folder.join(name));
+        std::fs::write(&second, "precious").unwrap();
+        let files = || vec![(first.clone(), b"1".to_vec()), (second.clone(), b"2".to_vec())];
+        assert!(matches!(write_all(files(), false), Ok(Saved::Exists(path)) if path == second));
+        assert!(!first.exists());
+        assert!(matches!(write_all(files(), true), Ok(Saved::Written(paths)) if paths.len() == 2));
+        assert_eq!(std::fs::read_to_string(&second).unwrap(), "2");
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
+}

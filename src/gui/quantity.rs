@@ -1,0 +1,72 @@
+//! How quantities are named, scaled and shown.
+
+use crate::history::Channel;
+
+/// How a quantity is shown.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Quantity {
+    pub(crate) name: &'static str,
+    /// Unit as shown.
+    pub(crate) unit: &'static str,
+    /// From the core's unit to the shown one.
+    pub(crate) scale: f64,
+    /// A plot's vertical range is at least this long, in the shown unit.
+    pub(crate) min_span: f64,
+}
+
+impl Quantity {
+    pub(crate) fn of(channel: Channel, degrees: bool) -> Self {
+        match (channel, degrees) {
+            (Channel::Displacement, _) => Self::plain("displacement", "m", 0.02),
+            (Channel::Velocity, _) => Self::plain("velocity", "m/s", 0.04),
+            (Channel::Pitch, true) => Self { scale: 1.0_f64.to_degrees(), ..Self::plain("pitch", "°", 0.4) },
+            (Channel::Pitch, false) => Self::plain("pitch", "rad", 0.007),
+        }
+    }
+
+    /// A quantity that is shown in the core's unit.
+    pub(crate) const fn plain(name: &'static str, unit: &'static str, min_span: f64) -> Self {
+        Self { name, unit, scale: 1.0, min_span }
+    }
+
+    /// Name and unit, for an axis.
+    pub(crate) fn label(&self) -> String {
+        format!("{} [{}]", self.name, self.unit)
+    }
+}
+
+/// From here on numbers have an exponent: a run that goes astray must not fill the page with digits.
+const LARGEST_PLAIN: f64 = 1e6;
+
+/// `value` with the decimals that make three digits of `scale`, so that numbers below each other compare.
+pub(crate) fn to_scale(value: f64, scale: f64) -> String {
+    if !value.is_finite() {
+        return "–".to_owned();
+    }
+    if value.abs() >= LARGEST_PLAIN {
+        return format!("{value:.2e}").replace('-', "−");
+    }
+    let decimals = if scale > 0.0 { (2.0 - scale.log10().floor()).clamp(0.0, 7.0) as usize } else { 3 };
+    let text = format!("{value:.decimals$}");
+    let zero = text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.');
+    if zero { text.trim_start_matches('-').to_owned() } else { text.replace('-', "−") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_three_digits_of_their_scale_and_stay_short() {
+        for (value, scale, text) in [
+            (0.07997, 0.008, "0.07997"),
+            (-0.0004, 1.0, "0.00"),
+            (-12.5, 30.0, "−12.5"),
+            (-2.1e300, 1.0, "−2.10e300"),
+            (f64::NAN, 1.0, "–"),
+            (1.0, f64::INFINITY, "1"),
+        ] {
+            assert_eq!(to_scale(value, scale), text);
+        }
+    }
+}
