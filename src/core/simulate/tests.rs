@@ -272,6 +272,13 @@ fn statistics_are_those_of_the_samples_after_15_s() {
     assert!(!Statistics::of(&samples[..20_000]).unwrap().settled, "5 m and 0.02 m in the last 10 s");
     assert!(!Statistics::of(&samples[16_000..20_000]).unwrap().settled, "4 s show nothing about 10 s");
     assert_eq!(Statistics::of(&[]), None);
+    let early = Statistics::between(&samples, [1.0, 2.0]).unwrap();
+    assert_eq!((early.from_s, early.x_m.min, early.x_m.max, early.settled), (1.0, 5.0, 5.0, true));
+    let last = Statistics::between(&samples, [14.999, 15.0]).unwrap();
+    assert_eq!((last.x_m.max, last.x_m.mean), (5.0, 2.505), "both ends count");
+    for outside in [[30.0, 40.0], [2.0, 1.0], [f64::NAN, 1.0]] {
+        assert_eq!(Statistics::between(&samples, outside), None, "{outside:?}");
+    }
 }
 
 #[test]

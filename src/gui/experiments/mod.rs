@@ -187,7 +187,7 @@ impl ExperimentsTab {
         Panel::left("experiment")
             .frame(side)
             .resizable(true)
-            .default_size(270.0)
+            .default_size(260.0)
             .size_range(240.0..=420.0)
             .show(ui, |ui| {
                 ScrollArea::vertical().show(ui, |ui| {
@@ -279,7 +279,10 @@ impl ExperimentsTab {
 
     fn head_ui(&mut self, comparison: &Comparison, ui: &mut Ui) {
         let settings = &comparison.settings;
-        ui.label(RichText::new(settings.scenario.title()).heading().strong());
+        // The list at the left says it too.
+        if ui.available_width() >= 420.0 {
+            ui.label(RichText::new(settings.scenario.title()).heading().strong());
+        }
         let colors = palette(ui.visuals());
         for (variant, _) in comparison.recorded() {
             legend_ui(ui, variant.title(settings.scenario), colors.runs[variant as usize]);

@@ -14,6 +14,8 @@ use crate::widgets::mono;
 const GAP_S: f64 = 0.05;
 /// Room for the readings at the right of each plot.
 const READING_WIDTH: f32 = 108.0;
+/// The plots alone get a page that is narrower.
+const LEAST_WIDTH_WITH_READINGS: f32 = 400.0;
 /// Height of the time axis with its label.
 const TIME_AXIS_HEIGHT: f32 = 36.0;
 
@@ -50,6 +52,8 @@ impl Plots {
         let room = ui.available_height() - TIME_AXIS_HEIGHT - count * spacing;
         let height = (room / count).max(30.0);
         let mut moved = Moved::default();
+        let has_readings = ui.available_width() >= LEAST_WIDTH_WITH_READINGS;
+        let beside = if has_readings { READING_WIDTH } else { 0.0 };
         for (index, signal) in signals.iter().enumerate() {
             let quantity = &signal.quantity;
             let last = index + 1 == signals.len();
@@ -61,14 +65,16 @@ impl Plots {
                 min_y_span: quantity.min_span,
             };
             ui.horizontal_top(|ui| {
-                let size = vec2((ui.available_width() - READING_WIDTH).max(1.0), plot.height);
+                let size = vec2((ui.available_width() - beside).max(1.0), plot.height);
                 let one = ui.allocate_ui(size, |ui| {
                     let mut curves = curves(ui, comparison, &mut self.caches[index], index, signal);
                     plot.show_marked(ui, &mut self.view, &mut curves, marks)
                 });
                 moved.cursor |= one.inner.cursor;
                 moved.range |= one.inner.range;
-                ui.vertical(|ui| reading_ui(ui, comparison, index, quantity, marks.cursor));
+                if has_readings {
+                    ui.vertical(|ui| reading_ui(ui, comparison, index, quantity, marks.cursor));
+                }
             });
         }
         moved

@@ -128,7 +128,8 @@ impl TimePlot<'_> {
         curves: &mut [TimeCurve<'_>],
         beside: impl FnOnce(&mut PlotUi<'_>),
     ) -> (PlotResponse<()>, Vec<Option<RangeStatistics>>) {
-        let columns = (ui.available_width() - Y_AXIS_WIDTH).max(1.0) * ui.ctx().pixels_per_point();
+        let width = (ui.available_width() - Y_AXIS_WIDTH).max(1.0);
+        let columns = width * ui.ctx().pixels_per_point();
         let drawn: Vec<(Color32, &Visible)> = curves
             .iter_mut()
             .map(|curve| {
@@ -140,7 +141,7 @@ impl TimePlot<'_> {
         let axes = Axes {
             x_label: self.x_label,
             y_label: self.label,
-            x_lines: 8.0,
+            x_lines: (f64::from(width) / 60.0).clamp(2.0, 8.0),
             y_lines: (f64::from(self.height) / 40.0).max(4.0),
         };
         let plot = Plot::new(self.id)
