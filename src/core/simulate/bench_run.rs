@@ -11,7 +11,7 @@ use super::noise::Noise;
 use super::sample::BenchSample;
 use super::sensors::Sensors;
 use super::simulation::{NotFinite, SENSOR_STREAM, SimulationSettings, TICK_S, TORQUE_STREAM};
-use super::statistics::{Summary, summary};
+use super::statistics::{Summary, between, summary};
 use super::tracking::StepResponse;
 use crate::control::{Readings, SpeedPi, SpeedPiState};
 use crate::friction::Stribeck;
@@ -40,10 +40,9 @@ impl BenchRun {
     }
 
     /// The same from one time to another, both included; none without samples between them.
-    pub fn statistics_between(&self, motor: Motor, [from_s, to_s]: [f64; 2]) -> Option<[Summary; 2]> {
-        let from = self.samples.partition_point(|sample| sample.time_s < from_s);
-        let to = self.samples.partition_point(|sample| sample.time_s <= to_s);
-        (from < to).then(|| Self::statistics_of(&self.samples[from..to], motor))
+    pub fn statistics_between(&self, motor: Motor, range_s: [f64; 2]) -> Option<[Summary; 2]> {
+        let counted = between(&self.samples, |sample| sample.time_s, range_s);
+        (!counted.is_empty()).then(|| Self::statistics_of(counted, motor))
     }
 
     fn statistics_of(samples: &[BenchSample], motor: Motor) -> [Summary; 2] {

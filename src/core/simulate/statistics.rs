@@ -1,5 +1,7 @@
 //! Statistics of runs, as in the paper's Tables 5 and 6.
 
+use std::cmp::Ordering;
+
 use serde::Serialize;
 
 use super::sample::Sample;
@@ -56,11 +58,10 @@ impl Statistics {
 
     /// The same of the samples from one time to another, both included; none without samples between them.
     /// Whether the robot settled or fell is said of the whole run.
-    pub fn between(samples: &[Sample], [from_s, to_s]: [f64; 2]) -> Option<Self> {
+    pub fn between(samples: &[Sample], range_s: [f64; 2]) -> Option<Self> {
         let end_s = samples.last()?.time_s;
         let after = |from_s: f64| &samples[samples.partition_point(|sample| sample.time_s < from_s)..];
-        let counted = after(from_s);
-        let counted = &counted[..counted.partition_point(|sample| sample.time_s <= to_s)];
+        let counted = between(samples, |sample| sample.time_s, range_s);
         if counted.is_empty() {
             return None;
         }
@@ -70,7 +71,7 @@ impl Statistics {
         let last = summary(after(end_s - window), |sample| sample.x_m);
         let long_enough = end_s - samples[0].time_s >= window;
         Some(Self {
-            from_s,
+            from_s: range_s[0],
             x_m: summary(counted, |sample| sample.x_m),
             x_dot_m_s: summary(counted, |sample| sample.x_dot_m_s),
             pitch_rad: summary(counted, |sample| sample.pitch_rad),
@@ -78,6 +79,16 @@ impl Statistics {
             fell,
         })
     }
+}
+
+/// The samples from one time to another, both included; none where the times are in no order.
+pub(super) fn between<T>(samples: &[T], time_s: impl Fn(&T) -> f64, [from_s, to_s]: [f64; 2]) -> &[T] {
+    if from_s.partial_cmp(&to_s).is_none_or(Ordering::is_gt) {
+        return &[];
+    }
+    let from = samples.partition_point(|sample| time_s(sample) < from_s);
+    let to = samples.partition_point(|sample| time_s(sample) <= to_s);
+    &samples[from..to]
 }
 
 pub(super) fn summary<T>(samples: &[T], value: impl Fn(&T) -> f64) -> Summary {
