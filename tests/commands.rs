@@ -425,7 +425,7 @@ fn wrong_models_are_refused_with_file_and_line() {
     assert!(refusal(&["gains", &bare], 1).contains("[lqr]"));
     let message = refusal(&["simulate", &bare, "--controller", "lqr"], 1);
     assert!(message.contains("bare.toml") && message.contains("[lqr]"), "{message}");
-    assert!(refusal(&["simulate", PAPER, "--seconds", "1e9"], 1).contains("3600"));
+    assert!(refusal(&["simulate", PAPER, "--seconds", "1e9"], 2).contains("3600"));
     assert!(refusal(&["simulate", PAPER, "--leg-height", "0.9"], 1).contains("leg_height_m = 0.9"));
     let short = ["simulate", PAPER, "--scenario", "friction-sweep", "--controller", "pi", "--seconds", "5"];
     assert!(refusal(&short, 1).contains("give at least"));

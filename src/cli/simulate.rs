@@ -12,7 +12,7 @@ use flqr_core::model_file::Model;
 use flqr_core::record;
 use flqr_core::robot::State;
 use flqr_core::simulate::{
-    self, BenchRun, ControllerChoice, Experiment, ExperimentError, Outcome, Run, Scenario, SpeedGains,
+    self, BenchRun, ControllerChoice, Experiment, ExperimentError, Outcome, Push, Run, Scenario, SpeedGains,
     Statistics, StepResponse, Summary,
 };
 use nalgebra::{Matrix2x4, RowVector4};
@@ -26,15 +26,17 @@ use super::{Cli, file, input};
 pub(crate) struct Arguments {
     /// Model file (TOML) that makes the controller: a [robot], or a rotary [axis] for experiments in the air
     model: PathBuf,
-    /// What the robot is put through: flat, bridge, kick, speed-tracking, friction-sweep, cruise, station,
-    /// multisine
+    /// What the robot is put through. On the ground: flat (let go 0.05 rad off upright), bridge (drives onto a
+    /// single-sided one), kick, cruise (out and back), station (stands), multisine (torques on top of the
+    /// controller's). Wheels in the air: speed-tracking, friction-sweep, and multisine with pi
     #[arg(long, value_name = "NAME", default_value = "flat")]
     scenario: Scenario,
-    /// State feedback without or with friction feedforward, or the speed control of wheels in the air
+    /// State feedback without or with friction feedforward; in the air lqr and pi are PI speed control, flqr
+    /// the same with friction feedforward
     #[arg(long, value_enum, default_value = "flqr")]
     controller: ControllerName,
-    /// Simulated time, s [default: 60, friction-sweep 120]
-    #[arg(long, value_parser = positive)]
+    /// Simulated time, s, at most 3600 [default: 60, friction-sweep 120]
+    #[arg(long, value_parser = duration, allow_negative_numbers = true)]
     seconds: Option<f64>,
     /// Write the run as a robot log, in the air as a bench log of one motor
     #[arg(long, value_name = "OUT.csv")]
@@ -42,9 +44,9 @@ pub(crate) struct Arguments {
     /// Seed of all noise
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Motor of the bench log and of its statistics; a single shaft has only one
-    #[arg(long, value_enum, default_value = "left")]
-    motor: MotorName,
+    /// Motor of the bench log and of its statistics, in the air [default: left]
+    #[arg(long, value_enum)]
+    motor: Option<MotorName>,
     /// Gain of the speed control in the air, N m s/rad, with --ki [default: by scenario]
     #[arg(long, requires = "ki", value_parser = not_negative)]
     kp: Option<f64>,
@@ -60,6 +62,28 @@ pub(crate) struct Arguments {
     /// Height of the legs in place of the model's, m
     #[arg(long, value_name = "M")]
     leg_height: Option<f64>,
+    #[command(flatten)]
+    settings: ScenarioSettings,
+}
+
+/// What a scenario itself can be told.
+#[derive(Args)]
+struct ScenarioSettings {
+    /// Target of speed-tracking, rad/s [default: 5]
+    #[arg(long, value_name = "RAD_S", allow_negative_numbers = true)]
+    target_speed: Option<f64>,
+    /// Force of the kick, forward positive, N [default: 30]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    kick_force: Option<f64>,
+    /// Duration of the kick, s [default: 0.1]
+    #[arg(long, value_name = "S")]
+    kick_duration: Option<f64>,
+    /// Where the kick acts: above the axle along the body, m [default: the centre of mass]
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    kick_height: Option<f64>,
+    /// Time of the kick, s [default: 8.5]
+    #[arg(long, value_name = "S")]
+    kick_at: Option<f64>,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -125,10 +149,10 @@ struct Tracking {
     right: StepResponse,
 }
 
-fn positive(text: &str) -> Result<f64, String> {
+fn duration(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
-        Ok(seconds) if seconds.is_finite() && seconds > 0.0 => Ok(seconds),
-        _ => Err("it must be a number of seconds above 0".to_owned()),
+        Ok(seconds) if (0.001..=3600.0).contains(&seconds) => Ok(seconds),
+        _ => Err("it must be a number of seconds from 0.001 to 3600".to_owned()),
     }
 }
 
@@ -141,8 +165,11 @@ fn not_negative(text: &str) -> Result<f64, String> {
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let experiment = experiment(arguments);
-    if experiment.controller == ControllerChoice::Pi && experiment.on_ground() {
-        let refused = ExperimentError::PiOnGround { scenario: experiment.scenario };
+    if let Err(refused) = experiment.check_usage() {
+        Cli::command().error(ErrorKind::ArgumentConflict, refused).exit();
+    }
+    if experiment.on_ground() && arguments.motor.is_some() {
+        let refused = "--motor has no effect on the ground, where a log holds both: leave it out";
         Cli::command().error(ErrorKind::ArgumentConflict, refused).exit();
     }
     let declared = input::load_model(&arguments.model)?;
@@ -150,6 +177,10 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let actual = actual.as_ref().unwrap_or(&declared);
     let in_file = |error: ExperimentError| match error {
         ExperimentError::NotFinite { problem, .. } => Failure::from_error(problem),
+        ExperimentError::Actual(error) => {
+            let file = arguments.robot.as_ref().unwrap_or(&arguments.model);
+            Failure::Message(format!("{}: {error}", file.display()))
+        }
         error => Failure::Message(format!("{}: {error}", arguments.model.display())),
     };
     let warnings = experiment.check(&declared, actual).map_err(in_file)?;
@@ -161,21 +192,29 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         Err(_) => None,
     };
     let motor = match arguments.motor {
-        MotorName::Left => Motor::Left,
-        MotorName::Right => Motor::Right,
+        None | Some(MotorName::Left) => Motor::Left,
+        Some(MotorName::Right) => Motor::Right,
     };
     if let (Some(path), Some(kept)) = (&arguments.log, kept) {
         write_log(path, kept, motor)?;
     }
-    let name = &declared.name;
+    let title = title(&experiment, &declared, actual);
     match &outcome.map_err(in_file)? {
-        Outcome::Ground(run) => report_ground(output, name, run),
+        Outcome::Ground(run) => report_ground(output, &title, run),
         Outcome::Bench(run) => {
             let side = if motor == Motor::Left { "left" } else { "right" };
-            let title = declared.robot().map_or(name.clone(), |_| format!("{name}, {side} motor"));
-            report_bench(output, &title, run, motor)
+            let of = declared.robot().map_or(String::new(), |_| format!(", {side} motor"));
+            report_bench(output, &format!("{title}{of}"), run, motor)
         }
     }
+}
+
+/// What was run, in a line.
+fn title(experiment: &Experiment, declared: &Model, actual: &Model) -> String {
+    let Experiment { scenario, controller, seconds, seed, .. } = experiment;
+    let robot = if declared == actual { String::new() } else { format!(" on {:?}", actual.name) };
+    let controller = controller.name();
+    format!("{}{robot}: {scenario}, {controller}, {seconds} s, seed {seed}", declared.name)
 }
 
 fn experiment(arguments: &Arguments) -> Experiment {
@@ -185,7 +224,15 @@ fn experiment(arguments: &Arguments) -> Experiment {
         ControllerName::Pi => ControllerChoice::Pi,
     };
     let default = Experiment::new(arguments.scenario, controller);
+    let settings = &arguments.settings;
     Experiment {
+        target_speed_rad_s: settings.target_speed.unwrap_or(default.target_speed_rad_s),
+        kick: Push {
+            start_s: settings.kick_at.unwrap_or(default.kick.start_s),
+            force_n: settings.kick_force.unwrap_or(default.kick.force_n),
+            duration_s: settings.kick_duration.unwrap_or(default.kick.duration_s),
+            height_m: settings.kick_height.or(default.kick.height_m),
+        },
         seconds: arguments.seconds.unwrap_or(default.seconds),
         seed: arguments.seed,
         speed_gains: arguments.kp.zip(arguments.ki).map(|(kp, ki)| SpeedGains { kp, ki }),
@@ -208,7 +255,7 @@ fn write_log(path: &Path, outcome: &Outcome, motor: Motor) -> Result<(), Failure
     file::write(path, "log", |out| record::write_log(&log, out))
 }
 
-fn report_ground(output: &Output, name: &str, run: &Run) -> Result<(), Failure> {
+fn report_ground(output: &Output, title: &str, run: &Run) -> Result<(), Failure> {
     let Statistics { from_s, x_m, x_dot_m_s, pitch_rad, settled, fell } = run.statistics;
     let keys = Simulated {
         statistics: Quantities::Ground { x_m, x_dot_m_s, pitch_rad },
@@ -228,7 +275,7 @@ fn report_ground(output: &Output, name: &str, run: &Run) -> Result<(), Failure> 
         ));
     }
     output.result(&keys, |out| {
-        writeln!(out, "{name}, from {from_s} s on, target x {} m\n", run.target_x_m)?;
+        writeln!(out, "{title}; from {from_s} s on, target x {} m\n", run.target_x_m)?;
         table(out, &[("x, m", x_m), ("x_dot, m/s", x_dot_m_s), ("pitch, rad", pitch_rad)])?;
         writeln!(out, "\nsettled: {}, fell: {}", yes(settled), yes(fell))
     })

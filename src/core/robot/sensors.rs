@@ -81,6 +81,11 @@ impl SensorSettings {
         period_ticks(self.motor_rate_hz)
     }
 
+    /// Mean age of an encoder or motor speed reading that is held until the next, s.
+    pub fn mean_motor_age_s(&self) -> f64 {
+        0.5 * f64::from(self.motor_period_ticks() - 1) / TICKS_PER_S
+    }
+
     /// Refuses steps and noises below zero, rates that do not divide 1000 Hz, and more than 32 bits.
     pub fn validate(&self) -> Result<(), ParameterError> {
         within("encoder_bits", f64::from(self.encoder_bits), 0.0..=32.0, "from 0 to 32")?;

@@ -106,6 +106,11 @@ pub(super) struct BenchRig {
 }
 
 impl BenchRig {
+    /// From a speed to the torque that answers it, s: the delay, and the mean age of a held reading.
+    pub(super) fn loop_delay_s(&self) -> f64 {
+        self.actuation.delay_s + self.sensors.mean_motor_age_s()
+    }
+
     /// Both wheels of a robot.
     pub(super) fn of_robot(robot: &RobotModel) -> Self {
         Self {

@@ -103,6 +103,21 @@ pub enum ExperimentError {
         /// What was asked for.
         scenario: Scenario,
     },
+    /// A setting that would change nothing.
+    #[error("{setting} has no effect in {scenario} with {}: leave it out, or use {place}", controller.name())]
+    NoEffect {
+        /// What was set.
+        setting: &'static str,
+        /// What was asked for.
+        scenario: Scenario,
+        /// The controller with it.
+        controller: ControllerChoice,
+        /// Where it would have one.
+        place: &'static str,
+    },
+    /// A problem of the robot that is simulated, where it is not the one that makes the controller.
+    #[error("{0}")]
+    Actual(Box<ExperimentError>),
     /// A single axis that is to balance.
     #[error(
         "{scenario} with {} needs a robot, but {name:?} is a single axis: give a model with a [robot] table",
@@ -165,7 +180,7 @@ pub enum ExperimentError {
 impl ExperimentError {
     /// Whether scenario and controller do not go together, whatever the models.
     pub fn is_wrong_usage(&self) -> bool {
-        matches!(self, Self::PiOnGround { .. })
+        matches!(self, Self::PiOnGround { .. } | Self::NoEffect { .. })
     }
 }
 
@@ -254,6 +269,8 @@ pub fn run(
 enum Plan {
     Ground {
         controller: BalanceController,
+        /// Whether the gain was given rather than designed.
+        given: bool,
         declared: Box<RobotModel>,
         actual: Box<RobotModel>,
     },
@@ -296,12 +313,45 @@ impl Experiment {
         Ok(Plan::new(self, declared, actual)?.warnings())
     }
 
-    fn validate(&self) -> Result<(), ExperimentError> {
+    /// Whether scenario, controller and settings go together, whatever the models.
+    ///
+    /// # Errors
+    /// Speed control on the ground, and settings that would change nothing; all are wrong usage.
+    pub fn check_usage(&self) -> Result<(), ExperimentError> {
         if self.on_ground() && self.controller == ControllerChoice::Pi {
             return Err(ExperimentError::PiOnGround { scenario: self.scenario });
         }
+        let default = Self::new(self.scenario, self.controller);
+        let ground = "a scenario on the ground";
+        let ignored = [
+            ("a gain", !self.on_ground() && self.gain.is_some(), ground),
+            ("a height of the legs", !self.on_ground() && self.leg_height_m.is_some(), ground),
+            ("a pair of kp and ki", self.on_ground() && self.speed_gains.is_some(), "a scenario in the air"),
+            ("a kick", self.scenario != Scenario::Kick && self.kick != default.kick, "the scenario kick"),
+            (
+                "a target speed",
+                self.scenario != Scenario::SpeedTracking
+                    && self.target_speed_rad_s != default.target_speed_rad_s,
+                "the scenario speed-tracking",
+            ),
+        ];
+        let (scenario, controller) = (self.scenario, self.controller);
+        match ignored.into_iter().find(|(_, ignored, _)| *ignored) {
+            Some((setting, _, place)) => {
+                Err(ExperimentError::NoEffect { setting, scenario, controller, place })
+            }
+            None => Ok(()),
+        }
+    }
+
+    fn validate(&self) -> Result<(), ExperimentError> {
+        self.check_usage()?;
         within("seconds", self.seconds, TICK_S..=MAX_SECONDS, "from 0.001 to 3600")?;
         within("target_speed_rad_s", self.target_speed_rad_s, -1e3..=1e3, "from -1000 to 1000")?;
+        if self.target_speed_rad_s == 0.0 {
+            let allowed = "other than 0, from which the shaft starts";
+            return Err(ParameterError { name: "target_speed_rad_s", value: 0.0, allowed }.into());
+        }
         if let Some(SpeedGains { kp, ki }) = self.speed_gains {
             not_negative("kp", kp)?;
             not_negative("ki", ki)?;
@@ -360,7 +410,8 @@ impl Plan {
     fn new(experiment: &Experiment, declared: &Model, actual: &Model) -> Result<Self, ExperimentError> {
         experiment.validate()?;
         if experiment.on_ground() {
-            let [declared, actual] = [experiment.robot(declared)?, experiment.robot(actual)?];
+            let [declared, actual] =
+                [experiment.robot(declared)?, experiment.robot(actual).map_err(of_actual)?];
             let gain = match experiment.gain {
                 Some(gain) => gain,
                 None => {
@@ -373,10 +424,10 @@ impl Plan {
                 ControllerChoice::Lqr | ControllerChoice::Pi => ControllerKind::Lqr,
             };
             let controller = BalanceController::new(kind, &declared, gain)?;
-            return Ok(Self::Ground { controller, declared, actual });
+            return Ok(Self::Ground { controller, given: experiment.gain.is_some(), declared, actual });
         }
         let compensation = declared.robot().and_then(|robot| robot.compensation);
-        let [declared, actual] = [experiment.rig(declared)?, experiment.rig(actual)?];
+        let [declared, actual] = [experiment.rig(declared)?, experiment.rig(actual).map_err(of_actual)?];
         let (program, gains) = experiment.program(&declared)?;
         let compensated = experiment.controller == ControllerChoice::Flqr;
         let control = speed_control(
@@ -398,14 +449,18 @@ impl Plan {
             (false, false) => None,
         };
         match self {
-            Self::Ground { controller, declared, actual } => {
+            Self::Ground { controller, given, declared, actual } => {
                 let fails = |robot: &RobotModel| !is_stable(robot, &controller.gain);
-                let mend = "design it with other weights, or shorten the delay";
+                let mend = if *given {
+                    "leave the gain to the design, or choose another one"
+                } else {
+                    "design it with other weights, or shorten the delay"
+                };
                 unstable(fails(declared), fails(actual), "the balance under this gain", mend)
             }
             Self::Bench { gains, declared, actual, .. } => {
                 let fails =
-                    |rig: &BenchRig| gains.phase_margin_rad(rig.inertia_kg_m2, rig.actuation.delay_s) <= 0.0;
+                    |rig: &BenchRig| gains.phase_margin_rad(rig.inertia_kg_m2, rig.loop_delay_s()) <= 0.0;
                 unstable(
                     fails(declared),
                     fails(actual),
@@ -417,6 +472,10 @@ impl Plan {
         .into_iter()
         .collect()
     }
+}
+
+fn of_actual(error: ExperimentError) -> ExperimentError {
+    ExperimentError::Actual(Box::new(error))
 }
 
 fn speed_control(

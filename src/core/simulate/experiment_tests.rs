@@ -220,6 +220,7 @@ fn what_cannot_run_is_refused_with_its_mend() {
     let legless = changed(|robot| robot.legs = None);
     let flat = Experiment::new(Scenario::Flat, ControllerChoice::Lqr);
     let sweep = Experiment::new(Scenario::FrictionSweep, ControllerChoice::Pi);
+    let step = Experiment::new(Scenario::SpeedTracking, ControllerChoice::Pi);
     let nothing = Some(Matrix2x4::from_element(f64::NAN));
     let kick = |kick: Push| Experiment { kick, ..Experiment::new(Scenario::Kick, ControllerChoice::Lqr) };
     for (experiment, model, part) in [
@@ -240,7 +241,29 @@ fn what_cannot_run_is_refused_with_its_mend() {
             &paper,
             "kp = -1",
         ),
-        (Experiment { target_speed_rad_s: f64::INFINITY, ..sweep }, &paper, "target_speed_rad_s = inf"),
+        (
+            Experiment { target_speed_rad_s: f64::INFINITY, ..step.clone() },
+            &paper,
+            "target_speed_rad_s = inf",
+        ),
+        (Experiment { target_speed_rad_s: 0.0, ..step.clone() }, &paper, "other than 0"),
+        (Experiment { target_speed_rad_s: 3.0, ..sweep }, &paper, "a target speed has no effect"),
+        (
+            Experiment { leg_height_m: Some(0.4), ..step.clone() },
+            &paper,
+            "a height of the legs has no effect",
+        ),
+        (Experiment { gain: nothing, ..step }, &paper, "a gain has no effect"),
+        (
+            Experiment { speed_gains: Some(SpeedGains::PAPER), ..flat.clone() },
+            &paper,
+            "a pair of kp and ki has no effect",
+        ),
+        (
+            Experiment { kick: Push { force_n: 3.0, ..Push::KICK }, ..flat.clone() },
+            &paper,
+            "a kick has no effect",
+        ),
         (kick(Push { start_s: -1.0, ..Push::KICK }), &paper, "start_s = -1"),
         (kick(Push { force_n: f64::NAN, ..Push::KICK }), &paper, "force_n = NaN"),
         (kick(Push { height_m: Some(f64::NAN), ..Push::KICK }), &paper, "height_m = NaN"),
@@ -249,8 +272,12 @@ fn what_cannot_run_is_refused_with_its_mend() {
         let Err(refused) = outcome else { panic!("{experiment:?} ran") };
         assert_eq!(experiment.check(model, model).unwrap_err().to_string(), refused.to_string());
         assert!(refused.to_string().contains(part), "{refused}");
-        assert_eq!(refused.is_wrong_usage(), part == "use lqr or flqr");
+        assert_eq!(refused.is_wrong_usage(), part == "use lqr or flqr" || part.contains("no effect"));
     }
+    // What the simulated robot lacks is said of it, not of the model that makes the controller.
+    let raised = Experiment { leg_height_m: Some(0.4), ..flat.clone() };
+    let refused = raised.check(&paper, &legless).unwrap_err();
+    assert!(matches!(refused, ExperimentError::Actual(_)), "{refused}");
     // A gain of one's own needs no weights.
     let own = Experiment { gain: Some(Matrix2x4::from_element(-1.0)), seconds: 0.1, ..flat };
     assert!(run(&own, &weightless, &weightless, &mut |_| ControlFlow::Continue(())).is_ok());

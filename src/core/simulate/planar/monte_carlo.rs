@@ -59,7 +59,7 @@ pub fn monte_carlo(
 ) -> Result<Vec<TrialOutcome>, ParameterError> {
     within("seconds", seconds, TICK_S..=MAX_SECONDS, "from 0.001 to 3600")?;
     for trial in trials {
-        trial.robot.parameters.validate()?;
+        trial.robot.validate()?;
     }
     let ticks = (seconds / TICK_S).round() as u64;
     let groups: Vec<&[Trial]> = trials.chunks(SIDE_BY_SIDE).collect();
