@@ -1,5 +1,7 @@
 //! What is to be run: scenario, duration, seed, and the buttons that start and stop it.
 
+use std::cell::Cell;
+
 use egui::{Button, ComboBox, DragValue, Grid, ProgressBar, RichText, Ui, vec2};
 
 use flqr_core::simulate::{Scenario, SpeedGains};
@@ -10,30 +12,46 @@ use super::runs::Runs;
 use crate::command::Command;
 use crate::context::ViewContext;
 use crate::theme::palette;
-use crate::widgets::{hint_ui, number_ui, section_ui};
+use crate::widgets::{hint_ui, number_ui, parse, section_ui, warning_ui};
 
 /// Longest run here, s; the command runs longer ones.
 const LONGEST_S: f64 = 600.0;
+const SHORTEST_S: f64 = 0.1;
+
+/// Which of the last entries could not be taken as they were.
+#[derive(Default)]
+pub(super) struct Limited {
+    seconds: bool,
+    seed: bool,
+}
 
 /// The whole form.
 pub(super) fn ui(
     context: &ViewContext<'_>,
-    settings: &mut Settings,
+    (settings, limited): (&mut Settings, &mut Limited),
     preflight: &mut Preflight,
     runs: &Runs,
     ui: &mut Ui,
 ) {
     section_ui(ui, "Experiment", |_| {});
     ui.add_enabled_ui(!runs.is_running(), |ui| {
-        scenarios_ui(settings, ui);
-        Grid::new("experiment").num_columns(2).spacing([12.0, 4.0]).show(ui, |ui| numbers_ui(settings, ui));
+        scenarios_ui(settings, limited, ui);
+        let grid = Grid::new("experiment").num_columns(2).spacing([12.0, 4.0]);
+        grid.show(ui, |ui| numbers_ui(settings, limited, ui));
+        if limited.seconds {
+            let limits = format!("The duration was limited: {SHORTEST_S} to {LONGEST_S} s here.");
+            warning_ui(ui, limits);
+        }
+        if limited.seed {
+            warning_ui(ui, "The seed was limited: 0 is the smallest.");
+        }
     });
     ui.add_space(2.0);
     preflight.ui(context, settings, ui);
     run_ui(context, settings, runs, ui);
 }
 
-fn scenarios_ui(settings: &mut Settings, ui: &mut Ui) {
+fn scenarios_ui(settings: &mut Settings, limited: &mut Limited, ui: &mut Ui) {
     ui.spacing_mut().item_spacing.y = 1.0;
     for scenario in Scenario::ALL {
         let chosen = settings.scenario == scenario;
@@ -41,6 +59,7 @@ fn scenarios_ui(settings: &mut Settings, ui: &mut Ui) {
         let button = ui.add(button.wrap_mode(egui::TextWrapMode::Truncate));
         if button.on_hover_text(scenario.description()).clicked() {
             settings.choose(scenario);
+            *limited = Limited::default();
         }
     }
     ui.add_space(3.0);
@@ -48,19 +67,28 @@ fn scenarios_ui(settings: &mut Settings, ui: &mut Ui) {
     ui.add_space(3.0);
 }
 
-fn numbers_ui(settings: &mut Settings, ui: &mut Ui) {
+fn numbers_ui(settings: &mut Settings, limited: &mut Limited, ui: &mut Ui) {
     ui.label("duration");
     ui.horizontal(|ui| {
-        number_ui(ui, &mut settings.seconds, "duration of the runs", 58.0)
-            .on_hover_text("Simulated time, at most 600 s here; the command runs longer ones");
-        settings.seconds = settings.seconds.clamp(0.1, LONGEST_S);
+        let field = number_ui(ui, &mut settings.seconds, "duration of the runs", 58.0);
+        let within = settings.seconds.clamp(SHORTEST_S, LONGEST_S);
+        if field.changed() {
+            limited.seconds = within != settings.seconds;
+        }
+        settings.seconds = within;
+        field.on_hover_text("Simulated time, at most 600 s here; the command runs longer ones");
         ui.label("s");
     });
     ui.end_row();
     ui.label("seed");
-    ui.add(DragValue::new(&mut settings.seed).min_size(vec2(58.0, 0.0)))
-        .accessible_name("experiment seed")
-        .on_hover_text("Seed of all noise: same model, settings and seed, same result");
+    let negative = Cell::new(None);
+    let read = |text: &str| parse(text).inspect(|value| negative.set(Some(*value < 0.0)));
+    let field = DragValue::new(&mut settings.seed).min_size(vec2(58.0, 0.0)).custom_parser(read);
+    let field = ui.add(field).accessible_name("experiment seed");
+    if let Some(negative) = negative.get().or(field.changed().then_some(false)) {
+        limited.seed = negative;
+    }
+    field.on_hover_text("Seed of all noise: same model, settings and seed, same result");
     ui.end_row();
     if !settings.scenario.on_ground() {
         gains_ui(settings, ui);

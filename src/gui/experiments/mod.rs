@@ -30,6 +30,7 @@ use crate::plot::Marks;
 use crate::theme::palette;
 use crate::widgets::{choice_ui, error_ui, hint_ui, section_ui, warning_ui};
 use dials::{Dials, GREATEST_HEIGHT};
+use form::Limited;
 use playback::Playback;
 use plots::Plots;
 use preflight::Preflight;
@@ -47,6 +48,7 @@ const STEP_VIEW_S: f64 = 2.0;
 pub(crate) struct ExperimentsTab {
     /// What the next runs are made with.
     settings: Settings,
+    limited: Limited,
     preflight: Preflight,
     runs: Runs,
     plots: Plots,
@@ -65,6 +67,7 @@ impl Default for ExperimentsTab {
     fn default() -> Self {
         Self {
             settings: Settings::default(),
+            limited: Limited::default(),
             preflight: Preflight::default(),
             runs: Runs::default(),
             plots: Plots::default(),
@@ -82,6 +85,7 @@ impl Default for ExperimentsTab {
 impl ExperimentsTab {
     /// Starts both runs on `model`, which `path` holds if it is saved.
     pub(crate) fn start(&mut self, model: Model, path: Option<PathBuf>, waker: &Waker) -> Result<(), String> {
+        self.saver.problem = None;
         self.runs
             .start(&self.settings, model, path, waker)
             .map_err(|error| format!("No thread for the runs: {error}."))
@@ -147,8 +151,8 @@ impl ExperimentsTab {
             let shown_s = if step { STEP_VIEW_S.min(limits[1]) } else { limits[1] };
             self.plots.view.show_all([0.0, shown_s]);
             self.table.choice = match self.table.choice {
-                Choice::Chosen(_) => Choice::Usual,
-                other => other,
+                Choice::Chosen(range) if range[1] <= limits[1] => Choice::Chosen(range),
+                _ => Choice::Usual,
             };
             self.playback.playing = false;
         }
@@ -191,7 +195,8 @@ impl ExperimentsTab {
             .size_range(240.0..=420.0)
             .show(ui, |ui| {
                 ScrollArea::vertical().show(ui, |ui| {
-                    form::ui(context, &mut self.settings, &mut self.preflight, &self.runs, ui);
+                    let form = (&mut self.settings, &mut self.limited);
+                    form::ui(context, form, &mut self.preflight, &self.runs, ui);
                     self.outcome_ui(context, ui);
                     if self.runs.comparison().is_some() {
                         self.saver.ui(context, ui);

@@ -156,6 +156,14 @@ impl Recorded {
         }
     }
 
+    /// Whether the robot fell at any time; none in the air.
+    pub(super) fn fell(&self) -> Option<bool> {
+        match &self.outcome {
+            Outcome::Ground(run) => Some(run.statistics.fell),
+            Outcome::Bench(_) => None,
+        }
+    }
+
     pub(super) fn fall(&self) -> Option<&Fall> {
         match &self.outcome {
             Outcome::Ground(run) => run.fall.as_ref(),

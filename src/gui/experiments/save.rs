@@ -71,8 +71,15 @@ pub(super) struct Extent {
 #[derive(Debug)]
 enum Saved {
     Written(Vec<PathBuf>),
-    /// A file is there already; nothing was written.
-    Exists(PathBuf),
+    /// These files are there already; nothing was written.
+    Exists(Vec<PathBuf>),
+}
+
+/// What was asked for and would replace files.
+struct Overwrite {
+    saved_as: SavedAs,
+    path: PathBuf,
+    existing: Vec<PathBuf>,
 }
 
 /// A picture that was asked for.
@@ -94,7 +101,7 @@ pub(super) struct Saver {
     job: Option<Job<(), Result<Saved, String>>>,
     /// What the running job would replace, and what it was asked with.
     asked: Option<(SavedAs, PathBuf)>,
-    overwrite: Option<(SavedAs, PathBuf)>,
+    overwrite: Option<Overwrite>,
     pub(super) problem: Option<String>,
     pub(super) focus_path: bool,
 }
@@ -168,13 +175,13 @@ impl Saver {
         };
         self.job = None;
         Some(match result {
-            Ok(Saved::Written(paths)) => {
-                let names: Vec<_> = paths.iter().map(|path| path.display().to_string()).collect();
-                Ok(format!("Saved {}.", names.join(", ")))
-            }
-            Ok(Saved::Exists(path)) => {
-                self.overwrite = self.asked.take();
-                Ok(format!("{} exists and was not replaced.", path.display()))
+            Ok(Saved::Written(paths)) => Ok(format!("Saved {}.", listed(&paths))),
+            Ok(Saved::Exists(existing)) => {
+                let verbs = if existing.len() == 1 { "exists and was" } else { "exist and were" };
+                let message = format!("{} {verbs} not replaced.", listed(&existing));
+                let asked = self.asked.take();
+                self.overwrite = asked.map(|(saved_as, path)| Overwrite { saved_as, path, existing });
+                Ok(message)
             }
             Err(problem) => {
                 self.problem = Some(problem.clone());
@@ -213,6 +220,7 @@ impl Saver {
         }
         if field.changed() {
             self.overwrite = None;
+            self.problem = None;
             self.saved_as = known_ending(Path::new(self.path.trim())).unwrap_or(self.saved_as);
         }
         field.on_hover_text("The ending says what is saved: .csv, .png, .svg or .html (Ctrl+L comes here)");
@@ -241,8 +249,8 @@ impl Saver {
     }
 
     fn overwrite_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
-        let Some((saved_as, path)) = self.overwrite.take() else { return };
-        warning_ui(ui, format!("Replace {}?", path.display()));
+        let Some(Overwrite { saved_as, path, existing }) = self.overwrite.take() else { return };
+        warning_ui(ui, format!("Replace {}?", listed(&existing)));
         let answer = ui.horizontal(|ui| {
             let replace = ui.button("Replace").on_hover_text("Replace what is there");
             (replace.clicked(), ui.button("Keep").on_hover_text("Leave what is there").clicked())
@@ -252,9 +260,14 @@ impl Saver {
                 context.commands.send(Command::SaveExperiment { saved_as, path, replace: true });
             }
             (_, true) => {}
-            _ => self.overwrite = Some((saved_as, path)),
+            _ => self.overwrite = Some(Overwrite { saved_as, path, existing }),
         }
     }
+}
+
+fn listed(paths: &[PathBuf]) -> String {
+    let names: Vec<_> = paths.iter().map(|path| path.display().to_string()).collect();
+    names.join(", ")
 }
 
 /// What a path's ending says is saved.
@@ -309,18 +322,24 @@ fn logs(path: &Path, comparison: &Comparison) -> Result<Vec<(PathBuf, Vec<u8>)>,
         for (suffix, log) in run.logs() {
             let mut text = Vec::new();
             write_log(&log, &mut text).map_err(|error| format!("the log has no text: {error}"))?;
-            let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-            let name = format!("{stem}-{}{suffix}", variant.name(comparison.settings.scenario));
-            let extension = path.extension().unwrap_or_default();
-            files.push((path.with_file_name(name).with_extension(extension), text));
+            files.push((log_path(path, variant.name(comparison.settings.scenario), suffix), text));
         }
     }
     Ok(files)
 }
 
+/// Where the log of a controller goes; the rest of the name may have points in it.
+fn log_path(path: &Path, controller: &str, suffix: &str) -> PathBuf {
+    let mut name = path.file_stem().unwrap_or_default().to_owned();
+    name.push(format!("-{controller}{suffix}.csv"));
+    path.with_file_name(name)
+}
+
 fn write_all(files: Vec<(PathBuf, Vec<u8>)>, replace: bool) -> Result<Saved, String> {
-    if !replace && let Some((path, _)) = files.iter().find(|(path, _)| path.symlink_metadata().is_ok()) {
-        return Ok(Saved::Exists(path.clone()));
+    let paths = files.iter().map(|(path, _)| path);
+    let existing: Vec<_> = paths.filter(|path| path.symlink_metadata().is_ok()).cloned().collect();
+    if !replace && !existing.is_empty() {
+        return Ok(Saved::Exists(existing));
     }
     let mut written = Vec::new();
     for (path, content) in files {
@@ -376,13 +395,35 @@ mod tests {
     }
 
     #[test]
+    fn every_log_has_a_file_of_its_own() {
+        let parts = [("lqr", ""), ("flqr", ""), ("pi", "-left"), ("pi", "-right"), ("flqr", "-left")];
+        for (name, stem) in [
+            ("run", "run"),
+            ("run.csv", "run"),
+            ("run.txt", "run.txt"),
+            ("trial.1", "trial.1"),
+            ("v1.2.CSV", "v1.2"),
+            ("a.csv.txt", "a.csv.txt"),
+            (".csv", ".csv"),
+            ("dot.", "dot."),
+        ] {
+            let path = with_ending(Path::new("/folder.d").join(name), SavedAs::Logs);
+            let paths = parts.map(|(controller, suffix)| log_path(&path, controller, suffix));
+            let different: std::collections::BTreeSet<_> = paths.iter().collect();
+            assert_eq!(different.len(), parts.len(), "{paths:?}");
+            assert_eq!(paths[0], PathBuf::from(format!("/folder.d/{stem}-lqr.csv")));
+            assert_eq!(paths[3], PathBuf::from(format!("/folder.d/{stem}-pi-right.csv")));
+        }
+    }
+
+    #[test]
     fn nothing_is_written_where_one_of_several_files_exists() {
         let folder = std::env::temp_dir().join(format!("flqr-save-{}", std::process::id()));
         std::fs::create_dir_all(&folder).unwrap();
         let [first, second] = ["a.csv", "b.csv"].map(|name| folder.join(name));
         std::fs::write(&second, "precious").unwrap();
         let files = || vec![(first.clone(), b"1".to_vec()), (second.clone(), b"2".to_vec())];
-        assert!(matches!(write_all(files(), false), Ok(Saved::Exists(path)) if path == second));
+        assert!(matches!(write_all(files(), false), Ok(Saved::Exists(paths)) if paths == [second.clone()]));
         assert!(!first.exists());
         assert!(matches!(write_all(files(), true), Ok(Saved::Written(paths)) if paths.len() == 2));
         assert_eq!(std::fs::read_to_string(&second).unwrap(), "2");

@@ -1,6 +1,6 @@
 //! Range, mean and standard deviation of both runs and the factor between them, as in the paper's Tables 5 to 7.
 
-use egui::{Grid, RichText, Ui};
+use egui::{Grid, Response, RichText, Ui};
 use flqr_core::simulate::{StepResponse, Summary};
 
 use super::run::Variant;
@@ -61,11 +61,14 @@ impl StatisticsTable {
         let statistics = self.statistics(comparison, marks.range);
         if statistics.iter().all(Option::is_none) {
             hint_ui(ui, "There is no sample in this range.");
-            return;
         }
         let grid = Grid::new("statistics").num_columns(4).striped(true).min_row_height(15.0);
         grid.spacing([13.0, 2.0]).show(ui, |ui| {
             head_ui(ui, comparison);
+            verdict_ui(ui, comparison);
+            if statistics.iter().all(Option::is_none) {
+                return;
+            }
             for (index, signal) in comparison.signals(degrees).iter().enumerate() {
                 let pair = [0, 1].map(|run: usize| statistics[run].as_ref().map(|found| found[index]));
                 rows_ui(ui, &signal.quantity, pair);
@@ -135,9 +138,9 @@ pub(super) fn tracking_ui(ui: &mut Ui, comparison: &Comparison) {
     });
 }
 
-type Response = (&'static str, fn(&StepResponse) -> Option<f64>);
+type Measure = (&'static str, fn(&StepResponse) -> Option<f64>);
 
-const TRACKING: [Response; 3] = [
+const TRACKING: [Measure; 3] = [
     ("rise time [s]", |response| response.rise_time_s),
     ("overshoot [rad/s]", |response| Some(response.overshoot_rad_s)),
     ("steady error [rad/s]", |response| Some(response.steady_error_rad_s)),
@@ -152,6 +155,24 @@ fn head_ui(ui: &mut Ui, comparison: &Comparison) {
     }
     hint_ui(ui, "factor").on_hover_text("Of the first run over the second: above 1 is better");
     ui.end_row();
+}
+
+/// Whether each run settled, on the ground; said of the whole run, whatever the range.
+fn verdict_ui(ui: &mut Ui, comparison: &Comparison) {
+    let verdicts = [0, 1].map(|run: usize| {
+        let run = comparison.runs[run].as_ref().ok()?;
+        Some(match (run.settled()?, run.fell()?) {
+            (true, _) => "yes",
+            (false, false) => "no",
+            (false, true) => "no, fell",
+        })
+    });
+    if verdicts.iter().all(Option::is_none) {
+        return;
+    }
+    row_ui(ui, "settled", verdicts.map(|verdict| verdict.map(str::to_owned)), None).on_hover_text(
+        "Whether x stayed within 0.05 m over the last 10 s of the run; one that fell or is shorter did not settle",
+    );
 }
 
 fn rows_ui(ui: &mut Ui, quantity: &Quantity, pair: [Option<Summary>; 2]) {
@@ -170,13 +191,14 @@ fn rows_ui(ui: &mut Ui, quantity: &Quantity, pair: [Option<Summary>; 2]) {
     row_ui(ui, "std", pair.map(|s| s.map(|s| to_scale(s.std * scale, std))), factor(pair, |s| s.std));
 }
 
-fn row_ui(ui: &mut Ui, name: &str, values: [Option<String>; 2], factor: Option<f64>) {
-    ui.add(egui::Label::new(RichText::new(name).small().weak()).extend());
+fn row_ui(ui: &mut Ui, name: &str, values: [Option<String>; 2], factor: Option<f64>) -> Response {
+    let name = ui.add(egui::Label::new(RichText::new(name).small().weak()).extend());
     for value in values {
         ui.label(mono(value.unwrap_or_else(|| "–".to_owned())));
     }
     ui.label(mono(factor.map(factor_text).unwrap_or_default()));
     ui.end_row();
+    name
 }
 
 /// How much larger a value is in the first run than in the second.

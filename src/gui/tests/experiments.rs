@@ -205,6 +205,7 @@ fn a_fall_is_said_with_time_and_state() {
     let fell = run["fell_s"].as_f64().unwrap();
     assert!(fell > 0.0 && fell < 20.0 && run["warnings"][0].is_string(), "{run:#}");
     window.get_by_label_contains(&format!("LQR: fell at {fell:.3} s, at x "));
+    assert!(window.query_all_by_label("no, fell").next().is_some(), "in the statistics too");
 }
 
 #[test]
@@ -249,6 +250,20 @@ fn runs_are_saved_as_logs_plots_and_report() {
         assert_eq!(log.column("x_m").unwrap(), x_m, "{name}");
     }
 
+    // A name with a point keeps both logs apart, and the question names what is there.
+    std::fs::write(path("run.txt-flqr.csv"), "precious").unwrap();
+    let refused = save(&mut window, "Logs", &path("run.txt"));
+    assert_eq!(refused, format!("{} exists and was not replaced.", path("run.txt-flqr.csv")));
+    assert!(!folder.join("run.txt-lqr.csv").exists());
+    window.step();
+    window.get_by_label(&format!("Replace {}?", path("run.txt-flqr.csv")));
+    click(&mut window, "Replace");
+    until(&mut window, "replacing", |s| s["message"].as_str().is_some_and(|m| m.starts_with("Saved")));
+    for name in ["lqr", "flqr"] {
+        let [plain, pointed] = ["run", "run.txt"].map(|stem| path(&format!("{stem}-{name}.csv")));
+        assert!(std::fs::read(plain).unwrap() == std::fs::read(pointed).unwrap(), "{name}");
+    }
+
     assert!(save(&mut window, "Plots", &path("plots.svg")).starts_with("Saved"));
     assert!(std::fs::read_to_string(path("plots.svg")).unwrap().contains("<svg"));
     assert!(save(&mut window, "Report", &path("report.html")).starts_with("Saved"));
@@ -267,6 +282,72 @@ fn runs_are_saved_as_logs_plots_and_report() {
     until(&mut window, "replacing", |s| s["message"].as_str().is_some_and(|m| m.starts_with("Saved")));
     assert!(std::fs::read_to_string(path("report.html")).unwrap().len() > 1000);
     std::fs::remove_dir_all(&folder).unwrap();
+}
+
+#[test]
+fn a_new_run_forgets_what_belonged_to_the_last() {
+    let mut window = page();
+    run_both(&mut window, "2");
+    let range = |window: &Window| state(window)["experiments_tab"]["range_s"].clone();
+    let usual = range(&window);
+    click(&mut window, "visible");
+    drag(&mut window, &[Pos2::new(600.0, 300.0), Pos2::new(540.0, 300.0), Pos2::new(480.0, 300.0)]);
+    assert_ne!(range(&window), usual);
+    // A file is no folder.
+    let file = TempFile::new("no-folder", "");
+    let said = save(&mut window, "Logs", &format!("{}/run.csv", file.name()));
+    assert!(said.contains("could not be saved"), "{said}");
+    rest(&mut window);
+    let problems = |window: &Window| window.query_all_by_label_contains("could not be saved").count();
+    let shown = problems(&window);
+    click(&mut window, "Run LQR and FLQR");
+    let runs = |s: &Value| s["experiments_tab"]["running"] == false;
+    until(&mut window, "other runs", runs);
+    rest(&mut window);
+    assert!(shown > problems(&window), "{shown}");
+    assert_eq!(range(&window), usual);
+
+    enter(&mut window, "statistics from", "0.5");
+    rest(&mut window);
+    let chosen = range(&window);
+    run_both(&mut window, "1.99");
+    assert_ne!(range(&window), chosen, "it would not fit into the run");
+    enter(&mut window, "statistics to", "1.25");
+    rest(&mut window);
+    let chosen = range(&window);
+    run_both(&mut window, "2");
+    assert_eq!(range(&window), chosen);
+}
+
+#[test]
+fn an_entry_beyond_the_limits_says_so() {
+    let mut window = page();
+    let hints = |window: &Window| window.query_all_by_label_contains("was limited").count();
+    for (field, key, typed, taken, limited) in [
+        ("duration of the runs", "seconds", "9000", 600.0, 1),
+        ("duration of the runs", "seconds", "30", 30.0, 0),
+        ("duration of the runs", "seconds", "0", 0.1, 1),
+        ("duration of the runs", "seconds", "600", 600.0, 0),
+        ("experiment seed", "seed", "-3", 0.0, 1),
+        ("experiment seed", "seed", "7", 7.0, 0),
+    ] {
+        enter(&mut window, field, typed);
+        rest(&mut window);
+        assert_eq!(state(&window)["experiments_tab"][key].as_f64(), Some(taken), "{typed}");
+        assert_eq!(hints(&window), limited, "{typed}");
+    }
+}
+
+#[test]
+fn the_statistics_say_whether_each_run_settled() {
+    let mut window = page();
+    let shown = run_both(&mut window, "30");
+    let settled = |index: usize| shown["experiments_tab"]["runs"][index]["settled"].as_bool().unwrap();
+    window.get_by_label("settled");
+    for (text, value) in [("yes", true), ("no", false)] {
+        let expected = [0, 1].into_iter().filter(|index| settled(*index) == value).count();
+        assert_eq!(window.query_all_by_label(text).count(), expected, "{text}");
+    }
 }
 
 #[test]
