@@ -112,6 +112,11 @@ fn a_fall_is_told() {
     balance::falls(&both, &mut pages);
     assert_eq!(pages.blocks.len(), 1);
     assert!(format!("{:?}", pages.blocks[0]).contains("under LQR the robot fell at 3.2 s"));
+    // A fall makes LQR's deviations large, which is no merit of FLQR.
+    let model = presets::paper();
+    let mut pages = Pages::default();
+    balance::write(&FLAT, model.robot().unwrap(), &both, &mut pages);
+    assert!(pages.findings.len() >= 2 && pages.findings.iter().all(|finding| !finding.holds));
 }
 
 #[test]

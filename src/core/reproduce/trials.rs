@@ -9,6 +9,7 @@ use crate::friction::{Compensation, Stribeck, StribeckParameters};
 use crate::identify::{self, Bounds, FitOptions, FitReport, Method, Motor, SearchBox};
 use crate::model_file::{Model, Rig, RobotModel};
 use crate::parallel;
+use crate::robot::{Actuation, MotorLimits, SensorSettings};
 use crate::simulate::{
     ControllerChoice, Experiment, Outcome, Push, Sample, Scenario, SpeedGains, Statistics, StepResponse,
     Summary, run,
@@ -93,11 +94,11 @@ const CAUSES: [(&str, Change); 7] = [
     ("sensors without noise and steps", |[_, actual]| exact_sensors(actual)),
     ("no delay", |[_, actual]| actual.actuation.delay_s = 0.0),
     ("the whole friction compensated", |[declared, _]| compensate_all(declared)),
-    ("none of these", |[declared, actual]| {
+    ("none of these, and no limits, steps or held readings", |[declared, actual]| {
         compensate_all(declared);
         ideal(actual);
     }),
-    ("none of these, and no friction", |[declared, actual]| {
+    ("nor any friction", |[declared, actual]| {
         ideal(actual);
         without_friction([declared, actual]);
     }),
@@ -119,9 +120,24 @@ fn exact_sensors(robot: &mut RobotModel) {
 }
 
 fn ideal(robot: &mut RobotModel) {
-    exact_sensors(robot);
-    robot.actuation.torque_noise_nm = 0.0;
-    robot.actuation.delay_s = 0.0;
+    // Whole literals, so that an imperfection that is added later cannot be forgotten here.
+    robot.actuation = Actuation { delay_s: 0.0, torque_noise_nm: 0.0, torque_step_nm: 0.0 };
+    robot.limits = MotorLimits::default();
+    robot.sensors = SensorSettings {
+        encoder_bits: 0,
+        motor_rate_hz: 1000.0,
+        motor_speed_step_rad_s: 0.0,
+        motor_speed_noise_rad_s: 0.0,
+        imu_rate_hz: 1000.0,
+        imu_latency_s: 0.0,
+        pitch_step_rad: 0.0,
+        pitch_noise_rad: 0.0,
+        pitch_rate_step_rad_s: 0.0,
+        pitch_rate_noise_rad_s: 0.0,
+        imu_mount_angle_rad: 0.0,
+        gyro_bias_rad_s: 0.0,
+        time_stamp_noise_s: 0.0,
+    };
 }
 
 fn without_friction([declared, actual]: [&mut RobotModel; 2]) {

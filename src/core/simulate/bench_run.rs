@@ -78,17 +78,20 @@ impl SpeedGains {
         Self { kp: 20.0 * inertia_kg_m2, ki: 20.0 * inertia_kg_m2 }
     }
 
+    /// Where the loop with an inertia crosses over, rad/s: |kp + ki/(jω)| = I ω.
+    pub(crate) fn crossover_rad_s(self, inertia_kg_m2: f64) -> f64 {
+        let (p, i) = (self.kp / inertia_kg_m2, self.ki / inertia_kg_m2);
+        (0.5 * (p * p + (p * p * p * p + 4.0 * i * i).sqrt())).sqrt()
+    }
+
     /// Phase margin of the loop with an inertia and a delay, half a tick of which is the hold's, rad: not above
     /// 0 where the loop is unstable, π without any gain.
-    pub(super) fn phase_margin_rad(self, inertia_kg_m2: f64, delay_s: f64) -> f64 {
-        let Self { kp, ki } = self;
-        // |kp + ki/(jω)| = I ω
-        let (p, i) = (kp / inertia_kg_m2, ki / inertia_kg_m2);
-        let crossover = (0.5 * (p * p + (p.powi(4) + 4.0 * i * i).sqrt())).sqrt();
+    pub(crate) fn phase_margin_rad(self, inertia_kg_m2: f64, delay_s: f64) -> f64 {
+        let crossover = self.crossover_rad_s(inertia_kg_m2);
         if crossover == 0.0 {
             return std::f64::consts::PI;
         }
-        libm::atan2(p * crossover, i) - crossover * (delay_s + 0.5 * TICK_S)
+        libm::atan2(self.kp * crossover, self.ki) - crossover * (delay_s + 0.5 * TICK_S)
     }
 }
 
