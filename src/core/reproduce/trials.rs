@@ -94,11 +94,11 @@ const CAUSES: [(&str, Change); 7] = [
     ("sensors without noise and steps", |[_, actual]| exact_sensors(actual)),
     ("no delay", |[_, actual]| actual.actuation.delay_s = 0.0),
     ("the whole friction compensated", |[declared, _]| compensate_all(declared)),
-    ("none of these, and no limits, steps or held readings", |[declared, actual]| {
+    ("none of these, no limits and no held readings", |[declared, actual]| {
         compensate_all(declared);
         ideal(actual);
     }),
-    ("nor any friction", |[declared, actual]| {
+    ("none of these, and no friction either", |[declared, actual]| {
         ideal(actual);
         without_friction([declared, actual]);
     }),
