@@ -4,7 +4,7 @@ use nalgebra::{Complex, Matrix2x4};
 
 use super::sampled_loop::{ContinuousLoop, SampledSystem};
 use crate::model_file::RobotModel;
-use crate::robot::LinearModel;
+use crate::robot::{LinearModel, TICK_S};
 
 /// When the controller measures and acts.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,8 +46,6 @@ pub struct Margins {
     pub gain_down_rad_s: f64,
 }
 
-/// Time from one control tick to the next, s; the paper's 1000 Hz.
-const TICK_S: f64 = 0.001;
 /// Longest delay whose eigenvalues are computed, ticks; of a longer one they would take more than a frame.
 const LONGEST_QUEUE: f64 = 64.0;
 /// IMU period and latency from which on the loop is not analysed, ticks.

@@ -46,7 +46,7 @@ mod surroundings;
 pub use actuation::{Actuation, LONGEST_DELAY_S, MotorLimits};
 pub use chassis::{Chassis, YawHold};
 pub use legs::{HeightNode, HeightTableError, Legs, OverHeight};
-pub use sensors::SensorSettings;
+pub use sensors::{SensorSettings, TICK_S};
 pub use surroundings::{Payload, Surroundings, Tether};
 
 use nalgebra::{Matrix4, Matrix4x2, Vector4};

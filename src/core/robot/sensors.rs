@@ -4,6 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::parameter::{ParameterError, finite, not_negative, within};
 
+/// Time from one tick of the control loop to the next, s; the paper's 1000 Hz.
+pub const TICK_S: f64 = 0.001;
 /// Ticks of the control loop in a second.
 const TICKS_PER_S: f64 = 1000.0;
 

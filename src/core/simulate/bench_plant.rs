@@ -4,13 +4,9 @@
 
 use std::ops::RangeInclusive;
 
-use super::change::first_below_zero;
+use super::change::{MAX_CHANGES, first_below_zero};
 use super::planar::sliding::SlidingFriction;
 use crate::friction::Stribeck;
-
-/// Changes between sliding and sticking within one substep after which the shaft is taken as stuck for the
-/// rest of it.
-const MAX_CHANGES: usize = 8;
 
 /// A shaft in motion.
 #[derive(Clone, Debug)]

@@ -1,5 +1,7 @@
 //! The instant inside a step at which a phase of motion ends.
 
+/// Changes of phase within one substep after which resting shafts are taken as stuck for the rest of it.
+pub(super) const MAX_CHANGES: usize = 8;
 /// Share of a step to which the instant is located.
 const TOLERANCE: f64 = 1e-9;
 

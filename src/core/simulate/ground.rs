@@ -43,7 +43,7 @@ impl Ground {
     /// too steep to roll over.
     pub fn step(at_m: f64, height_m: f64, wheel_radius_m: f64) -> Self {
         let reach = (height_m.abs() * (2.0 * wheel_radius_m - height_m.abs())).max(0.0).sqrt();
-        let chord = reach.hypot(height_m);
+        let chord = libm::hypot(reach, height_m);
         // A wheel rises before the edge and falls behind it.
         let start = if height_m > 0.0 { at_m - reach } else { at_m };
         Self::ramp(start, chord, height_m)

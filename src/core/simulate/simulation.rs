@@ -12,9 +12,8 @@ use crate::control::{BalanceController, Measurement, Readings, Reference};
 use crate::model_file::RobotModel;
 use crate::parameter::{finite, within};
 use crate::robot::State;
+pub use crate::robot::TICK_S;
 
-/// Time from one control tick to the next, s.
-pub const TICK_S: f64 = 0.001;
 /// Pitch beyond which the robot has fallen, rad.
 pub const FALL_PITCH_RAD: f64 = 0.8;
 /// Random streams of a seed: torque noise, then those of the sensors.

@@ -4,6 +4,7 @@ use std::num::NonZeroUsize;
 
 use super::super::actuator::Actuator;
 use super::super::noise::Noise;
+use super::super::scenario::MAX_SECONDS;
 use super::super::simulation::{FALL_PITCH_RAD, Fall, TICK_S};
 use super::super::statistics::Statistics;
 use super::batch::advance_batch;
@@ -21,8 +22,6 @@ use crate::robot::State;
 const SIDE_BY_SIDE: usize = 64;
 /// Integration steps a tick.
 const SUBSTEPS: u32 = 10;
-/// Longest run, s.
-const MAX_SECONDS: f64 = 3600.0;
 
 /// One robot under control, in its plane: heading, ground, legs and sensors take no part.
 #[derive(Clone, Debug)]

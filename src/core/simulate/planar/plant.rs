@@ -15,15 +15,12 @@
 
 use std::ops::RangeInclusive;
 
-use super::super::change::first_below_zero;
+use super::super::change::{MAX_CHANGES, first_below_zero};
 use super::laws::{Laws, Loads, Motion, runge_kutta};
 use super::near_angle::NearAngle;
 use super::sliding::SlidingFriction;
 use crate::friction::Stribeck;
 use crate::robot::{RobotParameters, State};
-
-/// Changes of phase within one substep after which the shafts are taken as stuck for the rest of it.
-const MAX_CHANGES: usize = 8;
 
 /// What acts on the robot, constant during a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -41,7 +41,7 @@ impl Body {
         let (apart_forward, apart_up) = (payload.forward_m, payload.height_m - self.com_distance_m);
         Self {
             mass_kg,
-            com_distance_m: forward.hypot(height),
+            com_distance_m: libm::hypot(forward, height),
             com_angle_rad: libm::atan2(forward, height),
             pitch_inertia_kg_m2: self.pitch_inertia_kg_m2
                 + reduced * (apart_forward * apart_forward + apart_up * apart_up),

@@ -41,7 +41,7 @@ mod motion;
 mod shafts;
 mod terrain;
 
-use super::change::first_below_zero;
+use super::change::{MAX_CHANGES, first_below_zero};
 use super::ground::Ground;
 use super::planar::Forcing;
 use crate::model_file::RobotModel;
@@ -49,9 +49,6 @@ use crate::robot::State;
 use laws::{Laws, Loads};
 use motion::{Motion, Smooth, runge_kutta};
 use shafts::{Phase, Phases, Shaft, margins, settled, shaft_torques, turning_torques};
-
-/// Changes of phase within one substep after which resting shafts are taken as stuck for the rest of it.
-const MAX_CHANGES: usize = 8;
 
 /// The robot in motion.
 #[derive(Clone, Debug)]
