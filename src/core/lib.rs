@@ -7,6 +7,8 @@
 //! | [`lqr`] | Riccati equation and LQR design |
 //! | [`friction`] | Stribeck curve and its feedforward |
 //! | [`control`] | one pure step from measurements to motor torques |
+//! | [`link`] | protocols of motors, IMU and adapters, without input or output |
+//! | [`device`] | sockets, ports, threads and clocks |
 //! | [`simulate`] | plant with sticking friction, sensors, scenarios |
 //! | [`record`] | logs: schema, reading, writing, health |
 //! | [`identify`] | friction and inertia from logs |
@@ -17,15 +19,17 @@
 //!
 //! # Invariants
 //! - SI units and radians everywhere; a name carries its unit where it has one.
-//! - No clock, no file, no printing, and no thread outside of [`parallel`]: time and randomness are arguments,
-//!   readers take `BufRead`, writers `Write`.
+//! - No printing; no clock, no file, no port outside of [`device`], and no thread outside of it and of [`parallel`]:
+//!   time and randomness are arguments, readers take `BufRead`, writers `Write`.
 //! - Same inputs and seed, same bytes out.
 //! - Nothing here knows the window.
 
 pub mod control;
+pub mod device;
 pub mod export;
 pub mod friction;
 pub mod identify;
+pub mod link;
 pub mod lqr;
 pub mod model_file;
 pub mod parallel;

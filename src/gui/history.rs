@@ -1,6 +1,6 @@
 //! The last minute of the live robot, ready for plotting.
 
-use flqr_core::simulate::Sample;
+use flqr_core::record::Sample;
 
 /// Samples that plots can reach: 60 s at 1 kHz.
 pub(crate) const HISTORY_SAMPLES: usize = 60_000;

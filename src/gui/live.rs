@@ -9,8 +9,9 @@ use std::time::{Duration, Instant};
 
 use flqr_core::control::BalanceController;
 use flqr_core::model_file::RobotModel;
+use flqr_core::record::Sample;
 use flqr_core::robot::State;
-use flqr_core::simulate::{Sample, Simulation, SimulationSettings, TICK_S};
+use flqr_core::simulate::{Simulation, SimulationSettings, TICK_S};
 
 use crate::job::Waker;
 

@@ -2,9 +2,11 @@
 //!
 //! LQR is u = K (X̃ − X) (Eqs. 13, 26); FLQR adds each motor's friction at its measured speed (Eq. 29). Both
 //! hold the heading. Torques are those of the two motor shafts, left then right, N m, and drive the robot
-//! forward when positive. A single motor on a bench is held at a speed by PI.
+//! forward when positive. A single motor on a bench is held at a speed by PI. [`drive`] puts a real robot under a
+//! controller.
 
 mod balance;
+pub mod drive;
 mod odometry;
 mod schedule;
 mod speed;

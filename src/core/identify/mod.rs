@@ -42,6 +42,7 @@ mod swarm;
 #[cfg(test)]
 mod test_data;
 
+pub use crate::robot::Motor;
 pub use error::FitError;
 pub use fit::fit;
 pub use pairs::{Dwell, PairSet, pairs_from_log};
@@ -61,16 +62,6 @@ pub struct FrictionPair {
     pub speed_rad_s: f64,
     /// Mean torque that held it, N m: the friction torque (Eq. 31).
     pub torque_nm: f64,
-}
-
-/// One motor of a robot.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Motor {
-    /// Seen in driving direction.
-    #[default]
-    Left,
-    /// Seen in driving direction.
-    Right,
 }
 
 /// How the six parameters are searched.

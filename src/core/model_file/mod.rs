@@ -13,7 +13,8 @@ use crate::ParameterError;
 use crate::friction::{Compensation, Stribeck};
 use crate::lqr::Weights;
 use crate::robot::{
-    Actuation, Chassis, Legs, MotorLimits, RobotParameters, SensorSettings, Surroundings, YawHold,
+    Actuation, Chassis, Legs, LinkSettings, MotorLimits, RobotParameters, SafetyLimits, SensorSettings,
+    Surroundings, YawHold,
 };
 use axis_schema::AxisFile;
 use refusal::Refusal;
@@ -63,6 +64,10 @@ pub struct RobotModel {
     pub sensors: SensorSettings,
     /// What acts from outside.
     pub surroundings: Surroundings,
+    /// How motors and IMU are wired.
+    pub link: LinkSettings,
+    /// When the driven robot is stopped.
+    pub safety: SafetyLimits,
 }
 
 impl RobotModel {
@@ -80,6 +85,8 @@ impl RobotModel {
             actuation: Actuation::default(),
             sensors: SensorSettings::default(),
             surroundings: Surroundings::default(),
+            link: LinkSettings::default(),
+            safety: SafetyLimits::default(),
         }
     }
 
@@ -116,7 +123,9 @@ impl RobotModel {
         self.limits.validate()?;
         self.actuation.validate()?;
         self.sensors.validate()?;
-        self.surroundings.validate()
+        self.surroundings.validate()?;
+        self.link.validate()?;
+        self.safety.validate()
     }
 }
 

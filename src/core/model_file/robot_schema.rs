@@ -8,8 +8,8 @@ use super::{Model, Rig, RobotModel};
 use crate::friction::{Compensation, Stribeck, StribeckParameters};
 use crate::lqr::Weights;
 use crate::robot::{
-    Actuation, Chassis, HeightNode, Legs, MotorLimits, OverHeight, RobotParameters, STANDARD_GRAVITY_M_S2,
-    SensorSettings, Surroundings, YawHold,
+    Actuation, Chassis, HeightNode, Legs, LinkSettings, MotorLimits, OverHeight, RobotParameters,
+    STANDARD_GRAVITY_M_S2, SafetyLimits, SensorSettings, Surroundings, YawHold,
 };
 
 #[derive(Deserialize, Serialize)]
@@ -32,6 +32,10 @@ pub(super) struct RobotFile {
     sensors: SensorSettings,
     #[serde(default, skip_serializing_if = "is_default")]
     surroundings: Surroundings,
+    #[serde(default, skip_serializing_if = "is_default")]
+    link: LinkSettings,
+    #[serde(default, skip_serializing_if = "is_default")]
+    safety: SafetyLimits,
 }
 
 fn is_default<T: Default + PartialEq>(value: &T) -> bool {
@@ -220,6 +224,8 @@ impl RobotFile {
             actuation: self.actuation,
             sensors: self.sensors,
             surroundings: self.surroundings,
+            link: self.link,
+            safety: self.safety,
         };
         for (table, checked) in [
             ("chassis", robot.chassis.validate()),
@@ -229,6 +235,8 @@ impl RobotFile {
             ("actuation", robot.actuation.validate()),
             ("sensors", robot.sensors.validate()),
             ("surroundings", robot.surroundings.validate()),
+            ("link", robot.link.validate()),
+            ("safety", robot.safety.validate()),
         ] {
             checked.map_err(Refusal::parameter(&[table]))?;
         }
@@ -249,6 +257,8 @@ impl RobotFile {
             actuation: model.actuation,
             sensors: model.sensors,
             surroundings: model.surroundings.clone(),
+            link: model.link,
+            safety: model.safety,
         }
     }
 }

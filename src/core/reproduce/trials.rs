@@ -9,10 +9,10 @@ use crate::friction::{Compensation, Stribeck, StribeckParameters};
 use crate::identify::{self, Bounds, FitOptions, FitReport, Method, Motor, SearchBox};
 use crate::model_file::{Model, Rig, RobotModel};
 use crate::parallel;
+use crate::record::Sample;
 use crate::robot::{Actuation, MotorLimits, SensorSettings};
 use crate::simulate::{
-    ControllerChoice, Experiment, Outcome, Push, Sample, Scenario, SpeedGains, Statistics, StepResponse,
-    Summary, run,
+    ControllerChoice, Experiment, Outcome, Push, Scenario, SpeedGains, Statistics, StepResponse, Summary, run,
 };
 
 /// How long a kick counts as a disturbance, s.

@@ -40,12 +40,18 @@
 mod actuation;
 mod chassis;
 mod legs;
+mod link;
+mod motor;
+mod safety;
 mod sensors;
 mod surroundings;
 
 pub use actuation::{Actuation, LONGEST_DELAY_S, MotorLimits};
 pub use chassis::{Chassis, YawHold};
 pub use legs::{HeightNode, HeightTableError, Legs, OverHeight};
+pub use link::{LinkSettings, PitchAxis, StateLayout, TorqueCommand, Turn};
+pub use motor::Motor;
+pub use safety::SafetyLimits;
 pub use sensors::{SensorSettings, TICK_S};
 pub use surroundings::{Payload, Surroundings, Tether};
 

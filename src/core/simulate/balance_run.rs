@@ -5,13 +5,13 @@ use std::ops::ControlFlow;
 use super::experiment::Push;
 use super::ground::Ground;
 use super::plant::{Plant, Pose};
-use super::sample::Sample;
 use super::scenario::Scenario;
 use super::simulation::{Command, Fall, NotFinite, Simulation, SimulationError, SimulationSettings, TICK_S};
 use super::statistics::Statistics;
 use crate::control::{BalanceController, Reference};
 use crate::identify::excitation::{Multisine, OutAndBack, PathPoint, Phases, SmoothMove};
 use crate::model_file::RobotModel;
+use crate::record::Sample;
 use crate::robot::State;
 
 /// Pitch at which the robot is let go, rad: nearly upright (assumed).

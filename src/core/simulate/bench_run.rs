@@ -8,7 +8,6 @@ use super::actuator::Actuator;
 use super::balance_run::multisines;
 use super::bench_plant::BenchPlant;
 use super::noise::Noise;
-use super::sample::BenchSample;
 use super::sensors::Sensors;
 use super::simulation::{NotFinite, SENSOR_STREAM, SimulationSettings, TICK_S, TORQUE_STREAM};
 use super::statistics::{Summary, between, summary};
@@ -18,6 +17,7 @@ use crate::friction::Stribeck;
 use crate::identify::Motor;
 use crate::identify::excitation::{Multisine, SpeedSweep, Step};
 use crate::model_file::{AxisModel, RobotModel};
+use crate::record::BenchSample;
 use crate::robot::{Actuation, MotorLimits, SensorSettings};
 
 /// What came of a run in the air.

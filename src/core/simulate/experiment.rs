@@ -7,7 +7,6 @@ use nalgebra::Matrix2x4;
 
 use super::balance_run::{Course, Run};
 use super::bench_run::{self, BenchRig, BenchRun, Program, SpeedGains};
-use super::sample::{BenchSample, Sample};
 use super::scenario::{MAX_SECONDS, Scenario};
 use super::simulation::{NotFinite, SimulationError, TICK_S};
 use crate::ParameterError;
@@ -19,6 +18,7 @@ use crate::lqr::{self, DesignError, SampledLoop};
 use crate::model_file::{Model, Rig, RobotModel};
 use crate::parameter::{finite, not_negative, within};
 use crate::record::Log;
+use crate::record::{BenchSample, Sample};
 
 /// Target of the speed tracking (section 4.3), rad/s.
 const TARGET_RAD_S: f64 = 5.0;

@@ -15,7 +15,6 @@ mod noise;
 mod planar;
 mod plant;
 mod response;
-mod sample;
 mod scenario;
 mod sensors;
 mod simulation;
@@ -31,7 +30,6 @@ pub use ground::Ground;
 pub use planar::{Forcing, PlanarPlant, Trial, TrialOutcome, advance_batch, monte_carlo};
 pub use plant::{Plant, Pose};
 pub use response::predicted_response;
-pub use sample::{BenchSample, Sample};
 pub use scenario::{Scenario, UnknownScenario};
 pub use simulation::{
     Command, FALL_PITCH_RAD, Fall, NotFinite, Simulation, SimulationError, SimulationSettings, TICK_S,

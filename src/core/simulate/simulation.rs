@@ -5,12 +5,12 @@ use super::ground::Ground;
 use super::noise::Noise;
 use super::planar::Forcing;
 use super::plant::{Plant, Pose};
-use super::sample::Sample;
 use super::sensors::Sensors;
 use crate::ParameterError;
 use crate::control::{BalanceController, Measurement, Readings, Reference};
 use crate::model_file::RobotModel;
 use crate::parameter::{finite, within};
+use crate::record::Sample;
 use crate::robot::State;
 pub use crate::robot::TICK_S;
 

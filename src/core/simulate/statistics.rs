@@ -4,8 +4,8 @@ use std::cmp::Ordering;
 
 use serde::Serialize;
 
-use super::sample::Sample;
 use super::simulation::FALL_PITCH_RAD;
+use crate::record::Sample;
 
 /// Start of the statistics: by then the robot has stood up and a kick has died away, s.
 pub(super) const STATISTICS_FROM_S: f64 = 15.0;

@@ -9,6 +9,7 @@ use crate::control::{BalanceController, ControllerKind};
 use crate::identify::Motor;
 use crate::lqr;
 use crate::model_file::{Model, RobotModel, presets};
+use crate::record::Sample;
 use crate::robot::{Actuation, SensorSettings, State, YawHold};
 
 fn paper() -> RobotModel {

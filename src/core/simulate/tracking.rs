@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use super::sample::BenchSample;
 use crate::identify::excitation::Step;
+use crate::record::BenchSample;
 
 /// Length of the end of a run over which the steady error is averaged, s; a tenth of shorter runs.
 const STEADY_S: f64 = 1.0;

@@ -5,10 +5,10 @@ use std::path::Path;
 
 use flqr_core::identify::Motor;
 use flqr_core::model_file::{Model, Rig};
-use flqr_core::record::Log;
+use flqr_core::record::{BenchSample, Log, Sample};
 use flqr_core::simulate::{
-    self, BenchRun, BenchSample, ControllerChoice, Experiment, ExperimentError, Fall, Outcome, Run, Sample,
-    Scenario, SpeedGains, Statistics, StepResponse, Summary, TimedPose,
+    self, BenchRun, ControllerChoice, Experiment, ExperimentError, Fall, Outcome, Run, Scenario, SpeedGains,
+    Statistics, StepResponse, Summary, TimedPose,
 };
 
 /// What both runs are made with; plain data, apart from their results.

@@ -106,8 +106,8 @@ impl Quantity {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::sample::Sample;
     use super::*;
+    use crate::record::Sample;
 
     /// Swings that die away, about a place that is not 0.
     fn state(tick: u64) -> State {

@@ -1,8 +1,8 @@
-//! Rows of the simulated robot's recorder.
+//! Rows of a robot's recorder, simulated or real.
 
+use super::schema;
 use crate::control::Readings;
 use crate::identify::Motor;
-use crate::record::schema;
 use crate::robot::State;
 
 /// What the robot's recorder writes at one tick: measured values, and the torque that was asked of the
@@ -34,7 +34,8 @@ pub struct Sample {
 }
 
 impl Sample {
-    pub(super) fn new(time_s: f64, readings: &Readings, state: &State, asked_nm: [f64; 2]) -> Self {
+    /// A row of what was read, what was made of it, and the torque that was asked for then, left and right.
+    pub fn new(time_s: f64, readings: &Readings, state: &State, asked_nm: [f64; 2]) -> Self {
         Self {
             time_s,
             x_m: state.x_m,

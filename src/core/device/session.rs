@@ -1,0 +1,322 @@
+//! A robot that is watched or driven: what is asked of the session, and what it tells.
+
+use std::fmt;
+use std::path::PathBuf;
+use std::str::FromStr;
+use std::time::Duration;
+
+use crate::control::BalanceController;
+use crate::control::drive::{Check, DriveOrder, Excitation, Stage};
+use crate::link::{MotorHealth, StampedFrame};
+use crate::model_file::RobotModel;
+use crate::record::Sample;
+
+/// Where the frames come from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// A CAN interface of the system (SocketCAN), such as `can0`.
+    Can {
+        /// Name of the interface.
+        interface: String,
+    },
+    /// An adapter on a serial port that speaks SLCAN.
+    Slcan {
+        /// Port, such as `/dev/ttyACM0` or `COM3`.
+        port: String,
+        /// Bit rate of the CAN bus, bit/s.
+        bit_rate: u32,
+    },
+    /// A robot emulated in this program.
+    Emulated,
+    /// A recording: the robot log, or the raw frames beside it.
+    Replay {
+        /// File.
+        file: PathBuf,
+    },
+}
+
+/// A source that cannot be read.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("no source is called `{text}`: give can:INTERFACE, slcan:PORT@BITRATE, emulated or replay:FILE")]
+pub struct SourceError {
+    text: String,
+}
+
+impl FromStr for Source {
+    type Err = SourceError;
+
+    fn from_str(text: &str) -> Result<Self, SourceError> {
+        let error = || SourceError { text: text.to_owned() };
+        let given = |rest: &str| (!rest.is_empty()).then(|| rest.to_owned()).ok_or_else(error);
+        match text.split_once(':') {
+            None if text == "emulated" => Ok(Self::Emulated),
+            Some(("can", interface)) => Ok(Self::Can { interface: given(interface)? }),
+            Some(("slcan", rest)) => {
+                let (port, rate) = rest.rsplit_once('@').unwrap_or((rest, "1000000"));
+                let bit_rate = rate.parse().map_err(|_| error())?;
+                Ok(Self::Slcan { port: given(port)?, bit_rate })
+            }
+            Some(("replay", file)) => Ok(Self::Replay { file: given(file)?.into() }),
+            _ => Err(error()),
+        }
+    }
+}
+
+impl fmt::Display for Source {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Self::Can { interface } => write!(f, "can:{interface}"),
+            Self::Slcan { port, bit_rate } => write!(f, "slcan:{port}@{bit_rate}"),
+            Self::Emulated => f.write_str("emulated"),
+            Self::Replay { file } => write!(f, "replay:{}", file.display()),
+        }
+    }
+}
+
+/// A serial port and its speed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SerialAddress {
+    /// Port, such as `/dev/ttyUSB0`.
+    pub port: String,
+    /// Speed, bit/s.
+    pub baud: u32,
+}
+
+/// Whether anything may ever be sent.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SessionMode {
+    /// Nothing is sent, whatever is asked for later.
+    Listen,
+    /// Listens until armed in two steps.
+    Drive {
+        /// First controller.
+        controller: Box<BalanceController>,
+        /// What the motors are to do.
+        excitation: Excitation,
+    },
+}
+
+/// What a session is opened with.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SessionOptions {
+    /// Where the frames come from.
+    pub source: Source,
+    /// IMU on a serial port of its own; an emulated or replayed robot has its IMU with it.
+    pub imu: Option<SerialAddress>,
+    /// The robot.
+    pub robot: RobotModel,
+    /// Whether anything may be sent.
+    pub mode: SessionMode,
+    /// Recording from the start: the robot log; the raw frames go to a file beside it.
+    pub record: Option<PathBuf>,
+    /// Seed of an emulated robot's noise.
+    pub seed: u64,
+    /// Speed of a replay; 1 is real time, infinite as fast as possible.
+    pub replay_speed: f64,
+}
+
+/// What is asked of a running session.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SessionOrder {
+    /// To the drive.
+    Drive(DriveOrder),
+    /// Starts a recording, or ends it.
+    Record(Option<PathBuf>),
+    /// Holds a replay, or lets it go on.
+    Pause(bool),
+    /// Speed of a replay.
+    ReplaySpeed(f64),
+    /// Pushes an emulated robot's body, forward positive, N for s.
+    Push {
+        /// Force, N.
+        force_n: f64,
+        /// Duration, s.
+        duration_s: f64,
+    },
+    /// Time between two updates.
+    Interval(Duration),
+}
+
+/// What has happened since the last update.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Update {
+    /// Rows of the robot log; where more than 0.1 s are between two, nothing was heard, and no line is drawn.
+    pub samples: Vec<Sample>,
+    /// The newest raw frames, at most [`Update::FRAMES`].
+    pub frames: Vec<StampedFrame>,
+    /// What happened, oldest first.
+    pub events: Vec<Event>,
+    /// How everything stands.
+    pub status: Status,
+}
+
+impl Update {
+    /// Most raw frames in one update.
+    pub const FRAMES: usize = 500;
+}
+
+/// Something worth a line of the record.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Event {
+    /// When, since the session's start.
+    pub time: Duration,
+    /// What sort.
+    pub kind: EventKind,
+    /// In a sentence.
+    pub text: String,
+}
+
+/// Sorts of events.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EventKind {
+    /// Connected, recording begun, stage changed.
+    Note,
+    /// Something is not as it should be.
+    Warning,
+    /// The robot was stopped.
+    Stop,
+}
+
+/// How everything stands.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Status {
+    /// Time of the session, or of the recording that is replayed.
+    pub time: Duration,
+    /// The bus.
+    pub connection: Connection,
+    /// The drive, in a session that may drive.
+    pub drive: Option<DriveStatus>,
+    /// Left and right motor.
+    pub motors: [MotorStatus; 2],
+    /// The IMU.
+    pub imu: ImuStatus,
+    /// Counts since the start.
+    pub counters: Counters,
+    /// The control loop's ticks.
+    pub timing: Timing,
+    /// The recording, if one is made.
+    pub recording: Option<RecordingStatus>,
+}
+
+/// Whether frames come.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Connection {
+    /// Open, and frames are heard.
+    Connected,
+    /// Open, but nothing has been heard for a second.
+    Silent {
+        /// What may be wrong, and the mend.
+        hint: String,
+    },
+    /// Lost; it is tried again by itself.
+    Lost {
+        /// What the system said.
+        reason: String,
+    },
+    /// A replay that has come to its end.
+    Ended,
+}
+
+/// How the drive stands.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DriveStatus {
+    /// How far it is from being driven.
+    pub stage: Stage,
+    /// What has to be right before that.
+    pub checks: Vec<Check>,
+}
+
+/// How a motor stands.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MotorStatus {
+    /// Newest temperature, °C.
+    pub temperature_c: Option<f64>,
+    /// Newest health.
+    pub health: Option<MotorHealth>,
+    /// Newest torque current, A.
+    pub current_a: Option<f64>,
+    /// Readings a second, over the last second.
+    pub rate_hz: f64,
+    /// Age of the newest reading.
+    pub age: Option<Duration>,
+    /// Replies that did not come.
+    pub missed: u64,
+}
+
+/// How the IMU stands.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ImuStatus {
+    /// Readings a second, over the last second.
+    pub rate_hz: f64,
+    /// Age of the newest reading.
+    pub age: Option<Duration>,
+    /// Newest temperature, °C.
+    pub temperature_c: Option<f64>,
+    /// Intact packets.
+    pub packets: u64,
+    /// Packets with a wrong sum.
+    pub corrupted: u64,
+    /// Bytes that belonged to no packet.
+    pub stray_bytes: u64,
+}
+
+/// Counts since the start.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Counters {
+    /// Frames from the bus.
+    pub received: u64,
+    /// Frames to the bus.
+    pub sent: u64,
+    /// Frames a second from the bus, over the last second.
+    pub received_hz: f64,
+    /// Share of the bus that frames took over the last second, stuffing included; none without a bit rate.
+    pub bus_load: Option<f64>,
+    /// Frames that the system or the adapter dropped before they were read.
+    pub dropped: u64,
+    /// Frames that came but did not reach a window or a recording.
+    pub lost: u64,
+    /// Error frames and damaged lines.
+    pub errors: u64,
+    /// Readings that came after the tick they were for.
+    pub late: u64,
+    /// Times the bus was lost and came back.
+    pub reconnects: u64,
+}
+
+/// Lateness of the control loop's ticks.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Timing {
+    /// Ticks so far.
+    pub ticks: u64,
+    /// Half of the ticks were not later, s.
+    pub median_s: f64,
+    /// 99 % of the ticks were not later, s.
+    pub p99_s: f64,
+    /// The latest one, s.
+    pub greatest_s: f64,
+    /// Ticks that were left out because the one before took too long.
+    pub skipped: u64,
+    /// Ticks by lateness: each bin reaches to [`Timing::EDGES_S`]; the last one has all above.
+    pub histogram: Vec<u64>,
+}
+
+impl Timing {
+    /// Upper edges of all bins but the last, s.
+    pub const EDGES_S: [f64; 14] =
+        [1e-6, 2e-6, 5e-6, 1e-5, 2e-5, 5e-5, 1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2];
+}
+
+/// How a recording stands.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RecordingStatus {
+    /// The robot log.
+    pub file: PathBuf,
+    /// Rows written.
+    pub rows: u64,
+    /// Frames written.
+    pub frames: u64,
+    /// Bytes of both files.
+    pub bytes: u64,
+    /// Why it has ended early: disk full, for instance.
+    pub problem: Option<String>,
+}

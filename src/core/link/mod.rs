@@ -1,0 +1,14 @@
+//! The robot on the wire: protocols without input or output, and what all buses have in common.
+//!
+//! Bytes go in and values come out, or the other way round; time is an argument. Ports, sockets and threads
+//! are in [`crate::device`].
+
+mod bus;
+mod frame;
+mod imu;
+mod motors;
+
+pub use bus::{Bus, BusError};
+pub use frame::{Direction, Frame, FrameId, FrameKind, StampedFrame};
+pub use imu::ImuReading;
+pub use motors::{MotorErrors, MotorEvent, MotorHealth, MotorOrder, MotorState};

@@ -1,0 +1,122 @@
+//! What the control loop asks of the two wheel motors and what it hears from them, in SI units, forward positive.
+
+use std::fmt;
+use std::time::Duration;
+
+use crate::robot::Motor;
+
+/// What is asked of both motors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum MotorOrder {
+    /// Put power on.
+    On,
+    /// Take power off; the motors still answer.
+    Off,
+    /// Torques of the left and the right motor, N m.
+    Torque([f64; 2]),
+    /// Read temperature, current, speed and encoder.
+    ReadState,
+    /// Read temperature, voltage and errors.
+    ReadHealth,
+    /// Forget errors whose cause is gone.
+    ClearErrors,
+}
+
+/// What a motor says of its motion.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MotorState {
+    /// When it was heard.
+    pub time: Duration,
+    /// Angle since the first reading, turns counted, rad.
+    pub angle_rad: f64,
+    /// Speed, rad/s.
+    pub speed_rad_s: f64,
+    /// Torque current, A.
+    pub current_a: f64,
+    /// Temperature, °C.
+    pub temperature_c: f64,
+}
+
+/// What a motor says of itself.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MotorHealth {
+    /// When it was heard.
+    pub time: Duration,
+    /// Temperature, °C.
+    pub temperature_c: f64,
+    /// Voltage of the supply, V.
+    pub voltage_v: f64,
+    /// Current from the supply, A; not known of older firmware.
+    pub supply_current_a: Option<f64>,
+    /// Whether it is switched on; not known of older firmware.
+    pub on: Option<bool>,
+    /// What is wrong with it.
+    pub errors: MotorErrors,
+}
+
+/// Error bits of a motor.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct MotorErrors(pub u8);
+
+impl MotorErrors {
+    const NAMES: [&'static str; 8] = [
+        "undervoltage",
+        "overvoltage",
+        "driver too hot",
+        "motor too hot",
+        "overcurrent",
+        "short circuit",
+        "stall",
+        "input signal lost",
+    ];
+
+    /// Whether nothing is wrong.
+    pub fn is_none(self) -> bool {
+        self.0 == 0
+    }
+
+    /// What is wrong, in words (LK protocol 2.36; 2.35 has the first and the fourth only).
+    pub fn names(self) -> impl Iterator<Item = &'static str> {
+        Self::NAMES
+            .into_iter()
+            .enumerate()
+            .filter(move |(bit, _)| self.0 >> bit & 1 == 1)
+            .map(|(_, name)| name)
+    }
+}
+
+impl fmt::Display for MotorErrors {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        if self.is_none() {
+            return f.write_str("no error");
+        }
+        f.write_str(&self.names().collect::<Vec<_>>().join(", "))
+    }
+}
+
+/// What was heard on the bus about a motor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum MotorEvent {
+    /// A reading of its motion.
+    State(Motor, MotorState),
+    /// A reading of its health.
+    Health(Motor, MotorHealth),
+    /// It has done what command byte says: switched on or off, for instance.
+    Acknowledged {
+        /// Which.
+        motor: Motor,
+        /// When.
+        time: Duration,
+        /// Command byte.
+        command: u8,
+    },
+    /// Another controller on the bus has asked it for a torque current, A.
+    Asked {
+        /// Which.
+        motor: Motor,
+        /// When.
+        time: Duration,
+        /// Asked for, A.
+        current_a: f64,
+    },
+}
