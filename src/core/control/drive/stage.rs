@@ -18,6 +18,18 @@ pub enum Stage {
     Stopped(StopReason),
 }
 
+impl Stage {
+    /// Name for files and scripts.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Listening => "listening",
+            Self::Checking => "checking",
+            Self::Driving => "driving",
+            Self::Stopped(_) => "stopped",
+        }
+    }
+}
+
 /// What is asked of the drive.
 #[derive(Clone, Debug, PartialEq)]
 pub enum DriveOrder {
