@@ -116,7 +116,17 @@ pub enum MotorEvent {
         motor: Motor,
         /// When.
         time: Duration,
-        /// Asked for, A.
+        /// Asked for, A, forward positive.
         current_a: f64,
+    },
+    /// It was silent for so long that its turns in between are not known: the angle of the reading that follows
+    /// starts from the last one that was known.
+    TurnsLost {
+        /// Which.
+        motor: Motor,
+        /// When it was heard again.
+        time: Duration,
+        /// For how long it was not heard.
+        silent: Duration,
     },
 }
