@@ -6,9 +6,12 @@
 mod bus;
 mod frame;
 mod imu;
+pub mod lk;
 mod motors;
+mod wheels;
 
 pub use bus::{Bus, BusError};
 pub use frame::{Direction, Frame, FrameId, FrameKind, StampedFrame};
 pub use imu::ImuReading;
 pub use motors::{MotorErrors, MotorEvent, MotorHealth, MotorOrder, MotorState};
+pub use wheels::{LONGEST_SILENCE, Wheels};
