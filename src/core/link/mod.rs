@@ -6,12 +6,13 @@
 mod bus;
 mod frame;
 mod imu;
+pub mod jy901;
 pub mod lk;
 mod motors;
 mod wheels;
 
 pub use bus::{Bus, BusError};
 pub use frame::{Direction, Frame, FrameId, FrameKind, StampedFrame};
-pub use imu::ImuReading;
+pub use imu::{ImuAssembler, ImuReading};
 pub use motors::{MotorErrors, MotorEvent, MotorHealth, MotorOrder, MotorState};
 pub use wheels::{LONGEST_SILENCE, Wheels};
