@@ -4,12 +4,11 @@ use std::ops::ControlFlow;
 
 use serde::Serialize;
 
-use super::actuator::Actuator;
 use super::balance_run::multisines;
 use super::bench_plant::BenchPlant;
-use super::noise::Noise;
+use super::motors::Motors;
 use super::sensors::Sensors;
-use super::simulation::{NotFinite, SENSOR_STREAM, SimulationSettings, TICK_S, TORQUE_STREAM};
+use super::simulation::{NotFinite, SENSOR_STREAM, SimulationSettings, TICK_S};
 use super::statistics::{Summary, between, summary};
 use super::tracking::StepResponse;
 use crate::control::{Readings, SpeedPi, SpeedPiState};
@@ -183,8 +182,7 @@ struct Bench<'a> {
     control: &'a [SpeedPi; 2],
     memory: [SpeedPiState; 2],
     shafts: [BenchPlant; 2],
-    actuators: [Actuator; 2],
-    torque_noise: [Noise; 2],
+    motors: Motors,
     sensors: Sensors,
 }
 
@@ -228,8 +226,7 @@ impl<'a> Bench<'a> {
             control,
             memory: [SpeedPiState::default(); 2],
             shafts: [0, 1].map(shaft),
-            actuators: [(); 2].map(|()| Actuator::new(&rig.limits, &rig.actuation)),
-            torque_noise: [0, 1].map(|motor| Noise::new(seed, TORQUE_STREAM + motor)),
+            motors: Motors::new(&rig.limits, &rig.actuation, seed),
             sensors: Sensors::new(rig.sensors, seed, SENSOR_STREAM),
         }
     }
@@ -244,11 +241,9 @@ impl<'a> Bench<'a> {
         };
         let readings = self.sensors.read(&truth, tick);
         let target_speed_rad_s = program.target_rad_s(time_s);
-        let mut torque_nm = [0.0; 2];
-        for (motor, torque) in torque_nm.iter_mut().enumerate() {
-            *torque = self.asked(motor, target_speed_rad_s, &readings, program.added_nm(motor, time_s));
-            self.advance(motor, *torque);
-        }
+        let torque_nm = [0, 1]
+            .map(|motor| self.asked(motor, target_speed_rad_s, &readings, program.added_nm(motor, time_s)));
+        self.advance(torque_nm);
         let mut sample = BenchSample {
             time_s: self.sensors.stamp(tick),
             motor_angle_rad: readings.motor_angle_rad,
@@ -273,10 +268,10 @@ impl<'a> Bench<'a> {
         if added_nm == 0.0 { asked } else { (asked + added_nm).clamp(-limit, limit) }
     }
 
-    fn advance(&mut self, motor: usize, asked_nm: f64) {
-        let noise = self.torque_noise[motor].normal(self.rig.actuation.torque_noise_nm);
-        let speed = self.shafts[motor].speed_rad_s();
-        let torque_nm = self.actuators[motor].step(asked_nm, speed) + noise;
-        self.shafts[motor].advance(torque_nm, TICK_S, SimulationSettings::default().substeps);
+    fn advance(&mut self, asked_nm: [f64; 2]) {
+        let speeds = self.shafts.each_ref().map(BenchPlant::speed_rad_s);
+        for (shaft, torque_nm) in self.shafts.iter_mut().zip(self.motors.step(asked_nm, speeds)) {
+            shaft.advance(torque_nm, TICK_S, SimulationSettings::default().substeps);
+        }
     }
 }

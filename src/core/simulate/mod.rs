@@ -11,10 +11,12 @@ mod bench_run;
 mod change;
 mod experiment;
 mod ground;
+mod motors;
 mod noise;
 mod planar;
 mod plant;
 mod response;
+mod robot;
 mod scenario;
 mod sensors;
 mod simulation;
@@ -30,6 +32,7 @@ pub use ground::Ground;
 pub use planar::{Forcing, PlanarPlant, Trial, TrialOutcome, advance_batch, monte_carlo};
 pub use plant::{Plant, Pose};
 pub use response::predicted_response;
+pub use robot::SimulatedRobot;
 pub use scenario::{Scenario, UnknownScenario};
 pub use simulation::{
     Command, FALL_PITCH_RAD, Fall, NotFinite, Simulation, SimulationError, SimulationSettings, TICK_S,

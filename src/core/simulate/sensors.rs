@@ -55,6 +55,11 @@ impl Sensors {
         self.held
     }
 
+    /// Readings of the IMU in a second from now on.
+    pub(super) fn set_imu_rate_hz(&mut self, rate_hz: f64) {
+        self.settings.imu_rate_hz = rate_hz;
+    }
+
     /// The recorder's time stamp of a tick, s: a little off where it has noise, and later than the one
     /// before, as of a recorder that stamps rows when they are written.
     pub(super) fn stamp(&mut self, tick: u64) -> f64 {

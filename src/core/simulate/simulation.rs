@@ -1,13 +1,10 @@
-//! The closed loop: sensors, controller, the way to the motors, plant.
+//! The closed loop: a robot and its controller.
 
-use super::actuator::Actuator;
 use super::ground::Ground;
-use super::noise::Noise;
-use super::planar::Forcing;
-use super::plant::{Plant, Pose};
-use super::sensors::Sensors;
+use super::plant::Pose;
+use super::robot::SimulatedRobot;
 use crate::ParameterError;
-use crate::control::{BalanceController, Measurement, Readings, Reference};
+use crate::control::{BalanceController, Measurement, Reference};
 use crate::model_file::RobotModel;
 use crate::parameter::{finite, within};
 use crate::record::Sample;
@@ -78,18 +75,7 @@ pub struct Command {
 #[derive(Clone, Debug)]
 pub struct Simulation {
     controller: BalanceController,
-    substeps: u32,
-    com_height_m: f64,
-    torque_noise_nm: f64,
-    plant: Plant,
-    sensors: Sensors,
-    actuators: [Actuator; 2],
-    torque_noise: [Noise; 2],
-    push: Forcing,
-    push_ticks_left: u64,
-    tick: u64,
-    fall: Option<Fall>,
-    not_finite: Option<NotFinite>,
+    robot: SimulatedRobot,
 }
 
 impl Simulation {
@@ -116,24 +102,7 @@ impl Simulation {
         settings: SimulationSettings,
         grounds: &[Ground; 2],
     ) -> Result<Self, SimulationError> {
-        robot.validate()?;
-        settings.validate()?;
-        grounds.iter().try_for_each(Ground::validate)?;
-        Ok(Self {
-            controller,
-            substeps: settings.substeps,
-            com_height_m: robot.parameters.com_height_m,
-            torque_noise_nm: robot.actuation.torque_noise_nm,
-            plant: Plant::on_ground(robot, grounds, &settings.initial),
-            sensors: Sensors::new(robot.sensors, settings.seed, SENSOR_STREAM),
-            actuators: [(); 2].map(|()| Actuator::new(&robot.limits, &robot.actuation)),
-            torque_noise: [0, 1].map(|motor| Noise::new(settings.seed, TORQUE_STREAM + motor)),
-            push: Forcing::default(),
-            push_ticks_left: 0,
-            tick: 0,
-            fall: None,
-            not_finite: None,
-        })
+        Ok(Self { controller, robot: SimulatedRobot::on_ground(robot, &settings, grounds)? })
     }
 
     /// One tick of keeping the station x = 0; see [`Simulation::step_to`].
@@ -145,13 +114,11 @@ impl Simulation {
     /// a delay earlier. After a fall, or where the motion is no longer finite, the motors are off, the robot
     /// stays where it is and so does the clock.
     pub fn step_to(&mut self, command: &Command) -> Sample {
-        let readings = self.sensors.read(&self.truth(), self.tick);
+        let readings = self.robot.read();
         let measurement = self.controller.odometry.measurement(&readings);
         let asked = if self.has_ended() { [0.0; 2] } else { self.asked(&measurement, command) };
-        let sample = Sample::new(self.sensors.stamp(self.tick), &readings, &measurement.state, asked);
-        if !self.has_ended() {
-            self.advance(asked);
-        }
+        let sample = Sample::new(self.robot.stamp(), &readings, &measurement.state, asked);
+        self.robot.advance(asked);
         sample
     }
 
@@ -160,63 +127,49 @@ impl Simulation {
         self.controller = controller;
     }
 
-    /// Pushes the body from the next tick on, forward positive, at a height above the axle along the body (at
-    /// its centre of mass if none is given, m); replaces a push that still acts. The duration is rounded to
-    /// whole ticks.
+    /// Pushes the body from the next tick on; see [`SimulatedRobot::push`].
     pub fn push(&mut self, force_n: f64, duration_s: f64, height_m: Option<f64>) {
-        let push_height_m = height_m.unwrap_or(self.com_height_m);
-        self.push = Forcing { push_n: force_n, push_height_m, ..Forcing::default() };
-        self.push_ticks_left = (duration_s / TICK_S).round().max(0.0) as u64;
+        self.robot.push(force_n, duration_s, height_m);
     }
 
     /// Time of the next tick, s.
     pub fn time_s(&self) -> f64 {
-        self.tick as f64 / 1000.0
+        self.robot.time_s()
     }
 
     /// The true state.
     pub fn state(&self) -> State {
-        self.plant.state()
+        self.robot.state()
     }
 
     /// The true state with heading, roll and the ground below.
     pub fn pose(&self) -> Pose {
-        self.plant.pose()
+        self.robot.pose()
     }
 
     /// True motor angles q, left and right, rad.
     pub fn motor_angle_rad(&self) -> [f64; 2] {
-        self.plant.motor_angle_rad()
+        self.robot.motor_angle_rad()
     }
 
     /// Whether friction holds the motor shafts just now.
     pub fn stuck(&self) -> [bool; 2] {
-        self.plant.stuck()
+        self.robot.stuck()
     }
 
     /// The fall that ended the motion, if there was one.
     pub fn fall(&self) -> Option<&Fall> {
-        self.fall.as_ref()
+        self.robot.fall()
     }
 
     /// Where the motion stopped being finite, if it did.
     pub fn not_finite(&self) -> Option<&NotFinite> {
-        self.not_finite.as_ref()
+        self.robot.not_finite()
     }
 
     /// Whether the robot has fallen or its motion is no longer finite.
     pub fn has_ended(&self) -> bool {
-        self.fall.is_some() || self.not_finite.is_some()
-    }
-
-    fn truth(&self) -> Readings {
-        let state = self.plant.state();
-        Readings {
-            motor_angle_rad: self.plant.motor_angle_rad(),
-            motor_speed_rad_s: self.plant.motor_speed_rad_s(),
-            pitch_rad: state.pitch_rad,
-            pitch_rate_rad_s: state.pitch_rate_rad_s,
-        }
+        self.robot.has_ended()
     }
 
     fn asked(&self, measurement: &Measurement, command: &Command) -> [f64; 2] {
@@ -227,28 +180,10 @@ impl Simulation {
             if added == 0.0 { controlled[motor] } else { (controlled[motor] + added).clamp(-limit, limit) }
         })
     }
-
-    fn advance(&mut self, asked: [f64; 2]) {
-        let speeds = self.plant.motor_speed_rad_s();
-        let torque_nm = std::array::from_fn(|motor| {
-            let noise = self.torque_noise[motor].normal(self.torque_noise_nm);
-            self.actuators[motor].step(asked[motor], speeds[motor]) + noise
-        });
-        let push = if self.push_ticks_left > 0 { self.push } else { Forcing::default() };
-        self.push_ticks_left = self.push_ticks_left.saturating_sub(1);
-        self.plant.advance(&Forcing { torque_nm, ..push }, TICK_S, self.substeps);
-        self.tick += 1;
-        let state = self.plant.state();
-        if !self.plant.is_finite() {
-            self.not_finite = Some(NotFinite { step: self.tick, time_s: self.time_s() });
-        } else if state.pitch_rad.abs() > FALL_PITCH_RAD {
-            self.fall = Some(Fall { time_s: self.time_s(), state });
-        }
-    }
 }
 
 impl SimulationSettings {
-    fn validate(&self) -> Result<(), ParameterError> {
+    pub(super) fn validate(&self) -> Result<(), ParameterError> {
         finite("x_m", self.initial.x_m)?;
         finite("x_dot_m_s", self.initial.x_dot_m_s)?;
         finite("pitch_rate_rad_s", self.initial.pitch_rate_rad_s)?;

@@ -87,9 +87,15 @@ impl Plant {
         let grounds = Self::grounds_under(robot, grounds);
         let laws = Laws::new(&robot.parameters, &robot.chassis, &robot.surroundings, grounds);
         let shafts = robot.friction.map(Shaft::new);
-        let motion = laws.motion(start);
-        let phases = [0, 1].map(|i: usize| shafts[i].phase_at(motion.speed[i]));
-        Self { laws, shafts, motion, phases }
+        let mut plant = Self { laws, shafts, motion: Motion::default(), phases: [Phase::Free; 2] };
+        plant.place(start);
+        plant
+    }
+
+    /// Puts the robot into a state, with heading 0 and no yaw rate.
+    pub fn place(&mut self, state: &State) {
+        self.motion = self.laws.motion(state);
+        self.phases = [0, 1].map(|i: usize| self.shafts[i].phase_at(self.motion.speed[i]));
     }
 
     /// The ground under each wheel, of an experiment and of the surroundings.
