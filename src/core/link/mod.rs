@@ -4,15 +4,19 @@
 //! are in [`crate::device`].
 
 mod bus;
+mod faulty;
 mod frame;
 mod imu;
 pub mod jy901;
 pub mod lk;
+mod loopback;
 mod motors;
 mod wheels;
 
 pub use bus::{Bus, BusError};
+pub use faulty::{FaultCounts, FaultRates, Faulty};
 pub use frame::{Direction, Frame, FrameId, FrameKind, StampedFrame};
 pub use imu::{ImuAssembler, ImuReading};
+pub use loopback::Loopback;
 pub use motors::{MotorErrors, MotorEvent, MotorHealth, MotorOrder, MotorState};
 pub use wheels::{LONGEST_SILENCE, Wheels};
