@@ -10,14 +10,17 @@
 //! - The same in an optional column of the schema leaves the row, with NaN as the value.
 //! - An empty cell of an optional column and any text in a column outside the schema is NaN without a problem.
 //! - Rows whose time does not follow are dropped, as few as possible (the longest rising sequence stays).
+//! - The last row of a [`recording`] is dropped where its line end is missing: the program that wrote it was killed.
 //! - A log in which every second row would be dropped, or time fails in more than one row of a hundred, is
 //!   refused. A repeated header (recordings appended to one another) is such a dropped row.
 
+mod cells;
 mod error;
 mod health;
 mod map;
 mod plan;
 mod read;
+pub mod recording;
 mod sample;
 pub mod schema;
 mod table;

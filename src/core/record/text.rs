@@ -2,30 +2,42 @@
 
 use std::io::{self, BufRead, Read};
 
-use super::LogError;
+use super::{LogError, recording};
 
 /// A row longer than this is damage, not data.
 const ROW_LIMIT_BYTES: usize = 1 << 20;
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// Rows of CSV text with their line numbers; comments and blank lines are left out.
+/// Lines of CSV text with their numbers; blank ones are left out.
 pub(super) struct Lines<'a, R> {
     reader: R,
     file: &'a str,
     buffer: Vec<u8>,
     line: u64,
     bytes: u64,
+    /// Whether every row of the file was written with its line end, so that one without was cut.
+    grows: bool,
+}
+
+/// A comment or a row.
+pub(super) enum Line<'a> {
+    /// A comment from its `#` to its line end.
+    Comment(&'a [u8]),
+    /// A row, or the header.
+    Row(Row<'a>),
 }
 
 /// One row: its text without the line end, and the line at which it starts.
 pub(super) struct Row<'a> {
     pub(super) text: &'a [u8],
     pub(super) line: u64,
+    /// Whether the end of the row is missing, as far as that can be known.
+    pub(super) torn: bool,
 }
 
 impl<'a, R: BufRead> Lines<'a, R> {
     pub(super) fn new(reader: R, file: &'a str) -> Self {
-        Self { reader, file, buffer: Vec::new(), line: 0, bytes: 0 }
+        Self { reader, file, buffer: Vec::new(), line: 0, bytes: 0, grows: false }
     }
 
     /// Line that was read last, from 1.
@@ -38,24 +50,60 @@ impl<'a, R: BufRead> Lines<'a, R> {
         self.bytes
     }
 
-    /// The next row; a row with a line break inside quotes covers several lines.
+    /// The next row; a row with a line break inside quotes covers several lines. Comments are left out.
     pub(super) fn next_row(&mut self) -> Result<Option<Row<'_>>, LogError> {
+        while let Some(line) = self.fill()? {
+            if !self.holds_comment() {
+                return Ok(Some(self.row(line)));
+            }
+        }
+        Ok(None)
+    }
+
+    /// The next comment or row.
+    pub(super) fn next_line(&mut self) -> Result<Option<Line<'_>>, LogError> {
+        let Some(line) = self.fill()? else { return Ok(None) };
+        if self.holds_comment() {
+            return Ok(Some(Line::Comment(without_line_end(&self.buffer).trim_ascii_start())));
+        }
+        Ok(Some(Line::Row(self.row(line))))
+    }
+
+    fn row(&self, line: u64) -> Row<'_> {
+        let torn = self.grows && !self.buffer.ends_with(b"\n");
+        Row { text: without_line_end(&self.buffer), line, torn }
+    }
+
+    fn holds_comment(&self) -> bool {
+        self.buffer.trim_ascii_start().starts_with(b"#")
+    }
+
+    /// Puts the next comment or row into the buffer; the line at which it starts.
+    fn fill(&mut self) -> Result<Option<u64>, LogError> {
         loop {
             self.buffer.clear();
             if self.append_line(self.line + 1)? == 0 {
                 return Ok(None);
             }
-            if self.line == 1 && self.buffer.starts_with(BYTE_ORDER_MARK) {
-                self.buffer.drain(..BYTE_ORDER_MARK.len());
+            if self.line == 1 {
+                self.look_at_first_line();
             }
-            let start = self.buffer.trim_ascii_start();
-            if !start.is_empty() && start[0] != b'#' {
+            if !self.buffer.trim_ascii_start().is_empty() {
                 break;
             }
         }
         let line = self.line;
-        while has_open_quote(&self.buffer) && self.append_line(line)? > 0 {}
-        Ok(Some(Row { text: without_line_end(&self.buffer), line }))
+        if !self.holds_comment() {
+            while has_open_quote(&self.buffer) && self.append_line(line)? > 0 {}
+        }
+        Ok(Some(line))
+    }
+
+    fn look_at_first_line(&mut self) {
+        if self.buffer.starts_with(BYTE_ORDER_MARK) {
+            self.buffer.drain(..BYTE_ORDER_MARK.len());
+        }
+        self.grows = self.buffer.starts_with(recording::FIRST_LINE.as_bytes());
     }
 
     /// Appends one line to the buffer; the row began at line `start`.

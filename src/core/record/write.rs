@@ -25,7 +25,7 @@ pub fn write_log(log: &Log, writer: impl Write) -> io::Result<()> {
 }
 
 /// Plain digits for usual magnitudes, an exponent for the others: `1e-300` in place of 300 zeros.
-fn push_number(cell: &mut String, value: f64) {
+pub(super) fn push_number(cell: &mut String, value: f64) {
     use std::fmt::Write;
     let plain = value == 0.0 || (1e-5..1e16).contains(&value.abs());
     let written = match value {

@@ -1,0 +1,109 @@
+//! Lines of a recording's logs.
+
+use std::fmt::Write;
+use std::time::Duration;
+
+use super::{FIRST_LINE, OPTIONAL_COLUMNS};
+use crate::record::write::push_number;
+use crate::record::{BenchSample, Sample};
+use crate::robot::Motor;
+
+/// What a recording is of.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct About {
+    /// Where the frames come from, as the user named it.
+    pub source: String,
+    /// Interface under which the frames are written, such as `can0`.
+    pub interface: String,
+    /// Start of the session, since 1970.
+    pub start: Duration,
+}
+
+/// A row of a recording's robot log.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Row {
+    /// What was measured and asked for.
+    pub sample: Sample,
+    /// Newest temperature of the left and the right motor, °C.
+    pub motor_temperature_c: [Option<f64>; 2],
+    /// Newest voltage of the supply, V.
+    pub bus_voltage_v: Option<f64>,
+}
+
+impl Row {
+    /// Names of the columns of a recording's robot log.
+    pub fn columns() -> impl Iterator<Item = &'static str> {
+        Sample::COLUMNS.into_iter().chain(OPTIONAL_COLUMNS)
+    }
+}
+
+impl From<Sample> for Row {
+    fn from(sample: Sample) -> Self {
+        Self { sample, motor_temperature_c: [None; 2], bus_voltage_v: None }
+    }
+}
+
+/// What stands above the rows of the robot log.
+pub fn robot_header(about: &About) -> String {
+    header("robot log", about, Row::columns())
+}
+
+/// What stands above the rows of a motor's bench log.
+pub fn bench_header(about: &About, motor: Motor) -> String {
+    header(&format!("bench log of the {motor} motor"), about, BenchSample::COLUMNS.into_iter())
+}
+
+fn header(kind: &str, about: &About, columns: impl Iterator<Item = &'static str>) -> String {
+    let columns = columns.collect::<Vec<_>>().join(",");
+    let source = one_line(&about.source);
+    let (seconds, micros) = (about.start.as_secs(), about.start.subsec_micros());
+    format!("{FIRST_LINE}: {kind} of {source}\n{START}{seconds}.{micros:06} s after 1970\n{columns}\n")
+}
+
+/// What the comment with the start of a recording begins with.
+const START: &str = "# time_s counts from ";
+
+/// Start of a recording since 1970, if this comment of its log says so.
+pub fn parse_start(comment: &str) -> Option<Duration> {
+    let (seconds, micros) = comment.strip_prefix(START)?.strip_suffix(" s after 1970")?.split_once('.')?;
+    let micros = (micros.len() == 6).then(|| micros.parse().ok())??;
+    Some(Duration::from_secs(seconds.parse().ok()?) + Duration::from_micros(micros))
+}
+
+/// Adds a row to the robot log.
+pub fn push_row(text: &mut String, row: &Row) {
+    let [left, right] = row.motor_temperature_c;
+    push_cells(text, row.sample.to_row().map(Some).into_iter().chain([left, right, row.bus_voltage_v]));
+}
+
+/// Adds a row to the bench log of a motor.
+pub fn push_bench_row(text: &mut String, sample: &BenchSample, motor: Motor) {
+    push_cells(text, sample.to_row(motor).map(Some).into_iter());
+}
+
+fn push_cells(text: &mut String, cells: impl Iterator<Item = Option<f64>>) {
+    for (index, cell) in cells.enumerate() {
+        if index > 0 {
+            text.push(',');
+        }
+        push_number(text, cell.unwrap_or(f64::NAN));
+    }
+    text.push('\n');
+}
+
+/// Adds a comment that says what happened and when.
+pub fn push_event(text: &mut String, time: Duration, what: &str) {
+    let written = writeln!(text, "# {:.3} s {}", time.as_secs_f64(), one_line(what));
+    written.expect("writing to a string cannot fail");
+}
+
+/// What happened and when, if this comment of a recording's log says so.
+pub fn parse_event(comment: &str) -> Option<(Duration, &str)> {
+    let (time, what) = comment.strip_prefix("# ")?.split_once(" s ")?;
+    Some((Duration::try_from_secs_f64(time.parse().ok()?).ok()?, what))
+}
+
+/// A comment ends with its line.
+fn one_line(text: &str) -> String {
+    text.split(['\n', '\r']).map(str::trim).filter(|line| !line.is_empty()).collect::<Vec<_>>().join("; ")
+}
