@@ -1,9 +1,13 @@
-//! Loading a log, beside a loop over the records of the csv crate that does nothing but parse the numbers.
+//! Loading a log, beside a loop over the records of the csv crate that does nothing but parse the numbers; and the
+//! text of a recording.
 
 use std::fmt::Write;
 use std::ops::ControlFlow;
+use std::time::Duration;
 
-use flqr_core::record::{ColumnMap, ReadOptions, read_log};
+use flqr_core::link::{Direction, Frame, FrameId, StampedFrame};
+use flqr_core::record::recording::{self, Row};
+use flqr_core::record::{ColumnMap, ReadOptions, Sample, read_log};
 
 fn main() {
     divan::main();
@@ -51,4 +55,40 @@ fn csv_crate_20_mb(bencher: divan::Bencher) {
         }
         columns
     });
+}
+
+/// The text of one second of a robot on a full bus: 8000 frames and 1000 rows.
+#[divan::bench]
+fn record_one_second(bencher: divan::Bencher) {
+    let frame = Frame::full(FrameId::Standard(0x141), [0xA1, 0x23, 0x36, 1, 0xE1, 0xFE, 0, 0xC0]);
+    let start = Duration::from_secs(1_700_000_000);
+    bencher.bench(|| {
+        let (mut rows, mut frames) = (String::new(), String::new());
+        for number in 0..8000_u32 {
+            let time = Duration::from_micros(u64::from(number) * 125);
+            let stamped = StampedFrame { time, direction: Direction::Received, frame };
+            recording::push_frame(&mut frames, start, "can0", &stamped);
+            if number.is_multiple_of(8) {
+                recording::push_row(&mut rows, &row(time.as_secs_f64()));
+            }
+        }
+        (rows, frames)
+    });
+}
+
+fn row(time_s: f64) -> Row {
+    let value = |column: f64| (time_s * column).sin();
+    Row::from(Sample {
+        time_s,
+        x_m: value(1.0),
+        x_dot_m_s: value(2.0),
+        pitch_rad: value(3.0),
+        pitch_rate_rad_s: value(4.0),
+        motor_angle_left_rad: value(5.0),
+        motor_angle_right_rad: value(6.0),
+        motor_speed_left_rad_s: value(7.0),
+        motor_speed_right_rad_s: value(8.0),
+        torque_left_nm: value(9.0),
+        torque_right_nm: value(10.0),
+    })
 }

@@ -19,14 +19,6 @@ pub(super) struct Lines<'a, R> {
     grows: bool,
 }
 
-/// A comment or a row.
-pub(super) enum Line<'a> {
-    /// A comment from its `#` to its line end.
-    Comment(&'a [u8]),
-    /// A row, or the header.
-    Row(Row<'a>),
-}
-
 /// One row: its text without the line end, and the line at which it starts.
 pub(super) struct Row<'a> {
     pub(super) text: &'a [u8],
@@ -58,15 +50,6 @@ impl<'a, R: BufRead> Lines<'a, R> {
             }
         }
         Ok(None)
-    }
-
-    /// The next comment or row.
-    pub(super) fn next_line(&mut self) -> Result<Option<Line<'_>>, LogError> {
-        let Some(line) = self.fill()? else { return Ok(None) };
-        if self.holds_comment() {
-            return Ok(Some(Line::Comment(without_line_end(&self.buffer).trim_ascii_start())));
-        }
-        Ok(Some(Line::Row(self.row(line))))
     }
 
     fn row(&self, line: u64) -> Row<'_> {

@@ -19,6 +19,8 @@ impl Names {
     /// The files of a recording called `name`, which may be said with the ending of the robot log or of the
     /// frames.
     pub fn new(name: &Path) -> Self {
+        // Without a slash at the end.
+        let name = name.components().as_path();
         let stem = if is_part(name) { name.with_extension("") } else { name.to_owned() };
         let with = |ending: &str| {
             let mut path = stem.as_os_str().to_owned();

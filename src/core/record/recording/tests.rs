@@ -141,7 +141,7 @@ fn comments_of_a_recording_are_understood() {
 
 #[test]
 fn a_recording_may_be_named_by_any_of_its_files() {
-    for name in ["runs/a", "runs/a.csv", "runs/a.log", "runs/a.CSV"] {
+    for name in ["runs/a", "runs/a.csv", "runs/a.log", "runs/a.CSV", "runs/a/"] {
         let names = Names::new(Path::new(name));
         let expected = ["runs/a.csv", "runs/a.log", "runs/a.left.csv", "runs/a.right.csv"].map(Path::new);
         let found = [&names.robot_log, &names.frames, &names.bench[0], &names.bench[1]];
