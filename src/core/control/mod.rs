@@ -8,14 +8,16 @@
 mod balance;
 pub mod drive;
 mod odometry;
+mod program;
 mod schedule;
 mod speed;
 mod yaw;
 
 pub use balance::{BalanceController, ControlError, ControllerKind, DEFAULT_COMPENSATION, Reference};
 pub use odometry::{Measurement, Odometry, Readings};
+pub use program::{SpeedProgram, SpeedRun};
 pub use schedule::{GainSchedule, ScheduleError, ScheduleNode};
-pub use speed::{SpeedPi, SpeedPiState};
+pub use speed::{SpeedGains, SpeedPi, SpeedPiState};
 pub use yaw::default_yaw_hold;
 
 #[cfg(test)]

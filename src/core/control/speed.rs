@@ -1,6 +1,50 @@
 //! Speed of one motor with its wheel in the air (Figures 6, 7).
 
+use serde::Serialize;
+
 use crate::friction::Feedforward;
+use crate::robot::TICK_S;
+
+/// Gains of the speed control, as the paper's kp and ki.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct SpeedGains {
+    /// kp, N m s/rad.
+    pub kp: f64,
+    /// ki, N m/rad.
+    pub ki: f64,
+}
+
+impl SpeedGains {
+    /// The paper's first pair (Figures 6a, 7a).
+    pub const PAPER: Self = Self { kp: 0.5, ki: 0.05 };
+
+    /// For constant speeds: with a crossover of 80 rad/s the shaft turns at 0.1 rad/s although friction falls
+    /// with speed there, 4 ms of delay cost 0.3 rad of phase, and an error is gone within 0.1 s.
+    pub fn firm(inertia_kg_m2: f64) -> Self {
+        Self { kp: 80.0 * inertia_kg_m2, ki: 1600.0 * inertia_kg_m2 }
+    }
+
+    /// Keeps the mean speed near its target and leaves the shaft to an excitation.
+    pub fn loose(inertia_kg_m2: f64) -> Self {
+        Self { kp: 20.0 * inertia_kg_m2, ki: 20.0 * inertia_kg_m2 }
+    }
+
+    /// Where the loop with an inertia crosses over, rad/s: |kp + ki/(jω)| = I ω.
+    pub(crate) fn crossover_rad_s(self, inertia_kg_m2: f64) -> f64 {
+        let (p, i) = (self.kp / inertia_kg_m2, self.ki / inertia_kg_m2);
+        (0.5 * (p * p + (p * p * p * p + 4.0 * i * i).sqrt())).sqrt()
+    }
+
+    /// Phase margin of the loop with an inertia and a delay, half a tick of which is the hold's, rad: not above
+    /// 0 where the loop is unstable, π without any gain.
+    pub(crate) fn phase_margin_rad(self, inertia_kg_m2: f64, delay_s: f64) -> f64 {
+        let crossover = self.crossover_rad_s(inertia_kg_m2);
+        if crossover == 0.0 {
+            return std::f64::consts::PI;
+        }
+        libm::atan2(self.kp * crossover, self.ki) - crossover * (delay_s + 0.5 * TICK_S)
+    }
+}
 
 /// PI control of a motor's speed in torque mode, with optional friction feedforward.
 #[derive(Clone, Copy, Debug, PartialEq)]

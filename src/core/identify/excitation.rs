@@ -19,6 +19,12 @@ const DWELL_STEP_S: f64 = 0.01;
 /// Shortest dwell, s: half a second gives pairs, and the ramp before it has to die away.
 const LEAST_DWELL_S: f64 = 0.6;
 
+/// Period of the multisines that robots are excited with, s, and their harmonics.
+const MULTISINE_PERIOD_S: f64 = 10.0;
+const MULTISINE_HARMONICS: RangeInclusive<u32> = 3..=47;
+/// Root of the mean of squares of the multisine on top of a balancing robot's torques, N m: about the friction's.
+pub const BALANCE_MULTISINE_NM: f64 = 0.06;
+
 /// A place on a path and the speed there.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PathPoint {
@@ -241,6 +247,12 @@ impl Multisine {
         let sum: f64 = self.lines.iter().map(|(speed, phase)| libm::cos(speed * time_s + phase)).sum();
         self.amplitude * sum
     }
+}
+
+/// Multisines of the left and the right motor with the given root of the mean of squares, N m.
+pub fn multisines(rms_nm: f64) -> [Multisine; 2] {
+    [Phases::Falling, Phases::Rising]
+        .map(|phases| Multisine::new(MULTISINE_PERIOD_S, MULTISINE_HARMONICS, rms_nm, phases))
 }
 
 #[cfg(test)]

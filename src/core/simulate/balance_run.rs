@@ -9,7 +9,9 @@ use super::scenario::Scenario;
 use super::simulation::{Command, Fall, NotFinite, Simulation, SimulationError, SimulationSettings, TICK_S};
 use super::statistics::Statistics;
 use crate::control::{BalanceController, Reference};
-use crate::identify::excitation::{Multisine, OutAndBack, PathPoint, Phases, SmoothMove};
+use crate::identify::excitation::{
+    BALANCE_MULTISINE_NM, Multisine, OutAndBack, PathPoint, SmoothMove, multisines,
+};
 use crate::model_file::RobotModel;
 use crate::record::Sample;
 use crate::robot::State;
@@ -22,10 +24,6 @@ const BRIDGE_TARGET_M: f64 = 1.0;
 const BRIDGE_DRIVE: SmoothMove = SmoothMove { start_s: 2.0, duration_s: 8.0, distance_m: BRIDGE_TARGET_M };
 const CRUISE_LAP_S: f64 = 20.0;
 const CRUISE_PEAK_M_S: f64 = 0.4;
-/// Period of the multisine, s, its harmonics, and the mean torque of each motor, N m: about the friction's.
-const MULTISINE_PERIOD_S: f64 = 10.0;
-const MULTISINE_HARMONICS: std::ops::RangeInclusive<u32> = 3..=47;
-const MULTISINE_NM: f64 = 0.06;
 /// Ticks from one true pose to the next.
 const POSE_TICKS: usize = 10;
 
@@ -112,7 +110,9 @@ impl Course {
                 let laps = OutAndBack::filling(seconds, CRUISE_LAP_S, CRUISE_PEAK_M_S);
                 Self { motion: Motion::Laps(laps), ..station }
             }
-            Scenario::Multisine => Self { motion: Motion::Torques(multisines(MULTISINE_NM)), ..station },
+            Scenario::Multisine => {
+                Self { motion: Motion::Torques(multisines(BALANCE_MULTISINE_NM)), ..station }
+            }
             Scenario::Station | Scenario::SpeedTracking | Scenario::FrictionSweep => station,
         }
     }
@@ -176,10 +176,4 @@ impl Course {
         let statistics = Statistics { fell, settled: measured.settled && !fell, ..measured };
         Ok(Run { samples, statistics, fall, poses, warnings, target_x_m: self.target_x_m(), not_finite })
     }
-}
-
-/// Multisines of the left and the right motor with the given root of the mean of squares, N m.
-pub(super) fn multisines(rms_nm: f64) -> [Multisine; 2] {
-    [Phases::Falling, Phases::Rising]
-        .map(|phases| Multisine::new(MULTISINE_PERIOD_S, MULTISINE_HARMONICS, rms_nm, phases))
 }

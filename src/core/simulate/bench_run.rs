@@ -2,19 +2,15 @@
 
 use std::ops::ControlFlow;
 
-use serde::Serialize;
-
-use super::balance_run::multisines;
 use super::bench_plant::BenchPlant;
 use super::motors::Motors;
 use super::sensors::Sensors;
 use super::simulation::{NotFinite, SENSOR_STREAM, SimulationSettings, TICK_S};
 use super::statistics::{Summary, between, summary};
 use super::tracking::StepResponse;
-use crate::control::{Readings, SpeedPi, SpeedPiState};
+use crate::control::{Readings, SpeedPi, SpeedProgram, SpeedRun};
 use crate::friction::Stribeck;
 use crate::identify::Motor;
-use crate::identify::excitation::{Multisine, SpeedSweep, Step};
 use crate::model_file::{AxisModel, RobotModel};
 use crate::record::BenchSample;
 use crate::robot::{Actuation, MotorLimits, SensorSettings};
@@ -50,47 +46,6 @@ impl BenchRun {
             summary(samples, |sample| sample.motor_speed_rad_s[motor]),
             summary(samples, |sample| sample.torque_nm[motor]),
         ]
-    }
-}
-
-/// Gains of the speed control, as the paper's kp and ki.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct SpeedGains {
-    /// kp, N m s/rad.
-    pub kp: f64,
-    /// ki, N m/rad.
-    pub ki: f64,
-}
-
-impl SpeedGains {
-    /// The paper's first pair (Figures 6a, 7a).
-    pub const PAPER: Self = Self { kp: 0.5, ki: 0.05 };
-
-    /// For constant speeds: with a crossover of 80 rad/s the shaft turns at 0.1 rad/s although friction falls
-    /// with speed there, 4 ms of delay cost 0.3 rad of phase, and an error is gone within 0.1 s.
-    pub fn firm(inertia_kg_m2: f64) -> Self {
-        Self { kp: 80.0 * inertia_kg_m2, ki: 1600.0 * inertia_kg_m2 }
-    }
-
-    /// Keeps the mean speed near its target and leaves the shaft to an excitation.
-    pub fn loose(inertia_kg_m2: f64) -> Self {
-        Self { kp: 20.0 * inertia_kg_m2, ki: 20.0 * inertia_kg_m2 }
-    }
-
-    /// Where the loop with an inertia crosses over, rad/s: |kp + ki/(jω)| = I ω.
-    pub(crate) fn crossover_rad_s(self, inertia_kg_m2: f64) -> f64 {
-        let (p, i) = (self.kp / inertia_kg_m2, self.ki / inertia_kg_m2);
-        (0.5 * (p * p + (p * p * p * p + 4.0 * i * i).sqrt())).sqrt()
-    }
-
-    /// Phase margin of the loop with an inertia and a delay, half a tick of which is the hold's, rad: not above
-    /// 0 where the loop is unstable, π without any gain.
-    pub(crate) fn phase_margin_rad(self, inertia_kg_m2: f64, delay_s: f64) -> f64 {
-        let crossover = self.crossover_rad_s(inertia_kg_m2);
-        if crossover == 0.0 {
-            return std::f64::consts::PI;
-        }
-        libm::atan2(self.kp * crossover, self.ki) - crossover * (delay_s + 0.5 * TICK_S)
     }
 }
 
@@ -145,42 +100,10 @@ impl BenchRig {
     }
 }
 
-/// What a scenario asks of the motors.
-pub(super) enum Program {
-    /// A step of the target speed.
-    Step(Step),
-    /// Constant speeds.
-    Sweep(SpeedSweep),
-    /// Torques on top of the speed control's.
-    Torques([Multisine; 2]),
-}
-
-impl Program {
-    /// A multisine that moves a shaft: 40 rad/s² of its inertia, and more than its friction.
-    pub(super) fn multisine(rig: &BenchRig) -> Self {
-        let level = |curve: &Option<Stribeck>| curve.map_or(0.0, |curve| curve.parameters().static_nm);
-        let friction_nm = rig.friction.iter().map(level).fold(0.0, f64::max);
-        Self::Torques(multisines(40.0 * rig.inertia_kg_m2 + 1.5 * friction_nm))
-    }
-
-    fn target_rad_s(&self, time_s: f64) -> f64 {
-        match self {
-            Self::Step(step) => step.at(time_s),
-            Self::Sweep(sweep) => sweep.at(time_s),
-            Self::Torques(_) => 0.0,
-        }
-    }
-
-    fn added_nm(&self, motor: usize, time_s: f64) -> f64 {
-        if let Self::Torques(motors) = self { motors[motor].at(time_s) } else { 0.0 }
-    }
-}
-
 /// Both motors in motion.
 struct Bench<'a> {
     rig: &'a BenchRig,
-    control: &'a [SpeedPi; 2],
-    memory: [SpeedPiState; 2],
+    control: SpeedRun,
     shafts: [BenchPlant; 2],
     motors: Motors,
     sensors: Sensors,
@@ -190,19 +113,19 @@ struct Bench<'a> {
 pub(super) fn run(
     rig: &BenchRig,
     control: &[SpeedPi; 2],
-    program: &Program,
+    program: &SpeedProgram,
     ticks: usize,
     seed: u64,
     watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> BenchRun {
-    let mut bench = Bench::new(rig, control, seed);
+    let mut bench = Bench::new(rig, SpeedRun::new(*control, program.clone()), seed);
     let mut samples: Vec<BenchSample> = Vec::with_capacity(ticks);
     let mut not_finite = None;
     for tick in 0..ticks {
         if tick.is_multiple_of(10) && watch(tick as f64 / ticks as f64).is_break() && tick > 0 {
             break;
         }
-        samples.push(bench.step(tick as u64, program));
+        samples.push(bench.step(tick as u64));
         if !bench.shafts.iter().all(BenchPlant::is_finite) {
             let step = tick as u64 + 1;
             not_finite = Some(NotFinite { step, time_s: step as f64 / 1000.0 });
@@ -210,21 +133,20 @@ pub(super) fn run(
         }
     }
     let tracking = match program {
-        Program::Step(step) => Some([0, 1].map(|motor| StepResponse::of(&samples, motor, step))),
+        SpeedProgram::Step(step) => Some([0, 1].map(|motor| StepResponse::of(&samples, motor, step))),
         _ => None,
     };
     BenchRun { samples, tracking, warnings: Vec::new(), not_finite }
 }
 
 impl<'a> Bench<'a> {
-    fn new(rig: &'a BenchRig, control: &'a [SpeedPi; 2], seed: u64) -> Self {
+    fn new(rig: &'a BenchRig, control: SpeedRun, seed: u64) -> Self {
         let shaft = |motor: usize| {
             BenchPlant::new(rig.inertia_kg_m2, rig.gravity_torque_nm, rig.friction[motor], 0.0, 0.0)
         };
         Self {
             rig,
             control,
-            memory: [SpeedPiState::default(); 2],
             shafts: [0, 1].map(shaft),
             motors: Motors::new(&rig.limits, &rig.actuation, seed),
             sensors: Sensors::new(rig.sensors, seed, SENSOR_STREAM),
@@ -232,7 +154,7 @@ impl<'a> Bench<'a> {
     }
 
     /// One tick: read, control, move on by 1 ms.
-    fn step(&mut self, tick: u64, program: &Program) -> BenchSample {
+    fn step(&mut self, tick: u64) -> BenchSample {
         let time_s = tick as f64 / 1000.0;
         let truth = Readings {
             motor_angle_rad: self.shafts.each_ref().map(BenchPlant::angle_rad),
@@ -240,9 +162,8 @@ impl<'a> Bench<'a> {
             ..Readings::default()
         };
         let readings = self.sensors.read(&truth, tick);
-        let target_speed_rad_s = program.target_rad_s(time_s);
-        let torque_nm = [0, 1]
-            .map(|motor| self.asked(motor, target_speed_rad_s, &readings, program.added_nm(motor, time_s)));
+        let target_speed_rad_s = self.control.target_rad_s(time_s);
+        let torque_nm = self.control.step(time_s, readings.motor_speed_rad_s);
         self.advance(torque_nm);
         let mut sample = BenchSample {
             time_s: self.sensors.stamp(tick),
@@ -258,14 +179,6 @@ impl<'a> Bench<'a> {
             once(&mut sample.torque_nm);
         }
         sample
-    }
-
-    fn asked(&mut self, motor: usize, target_rad_s: f64, readings: &Readings, added_nm: f64) -> f64 {
-        let control = &self.control[motor];
-        let speed = readings.motor_speed_rad_s[motor];
-        let asked = control.step(&mut self.memory[motor], target_rad_s, speed, TICK_S);
-        let limit = control.torque_limit_nm.max(0.0);
-        if added_nm == 0.0 { asked } else { (asked + added_nm).clamp(-limit, limit) }
     }
 
     fn advance(&mut self, asked_nm: [f64; 2]) {

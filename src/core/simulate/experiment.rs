@@ -6,11 +6,13 @@ use std::ops::ControlFlow;
 use nalgebra::Matrix2x4;
 
 use super::balance_run::{Course, Run};
-use super::bench_run::{self, BenchRig, BenchRun, Program, SpeedGains};
+use super::bench_run::{self, BenchRig, BenchRun};
 use super::scenario::{MAX_SECONDS, Scenario};
 use super::simulation::{NotFinite, SimulationError, TICK_S};
 use crate::ParameterError;
-use crate::control::{BalanceController, ControlError, ControllerKind, DEFAULT_COMPENSATION, SpeedPi};
+use crate::control::{
+    BalanceController, ControlError, ControllerKind, DEFAULT_COMPENSATION, SpeedGains, SpeedPi, SpeedProgram,
+};
 use crate::friction::{Compensation, Feedforward};
 use crate::identify::Motor;
 use crate::identify::excitation::{SpeedSweep, Step};
@@ -276,7 +278,7 @@ enum Plan {
     },
     Bench {
         control: [SpeedPi; 2],
-        program: Program,
+        program: SpeedProgram,
         gains: SpeedGains,
         declared: Box<BenchRig>,
         actual: Box<BenchRig>,
@@ -387,19 +389,21 @@ impl Experiment {
         }
     }
 
-    fn program(&self, declared: &BenchRig) -> Result<(Program, SpeedGains), ExperimentError> {
+    fn program(&self, declared: &BenchRig) -> Result<(SpeedProgram, SpeedGains), ExperimentError> {
         let inertia = declared.inertia_kg_m2;
         let (program, gains) = match self.scenario {
             Scenario::FrictionSweep => {
                 let least = SpeedSweep::least_seconds();
                 let sweep = SpeedSweep::new(self.seconds)
                     .ok_or(ExperimentError::SweepTooShort { seconds: self.seconds, least })?;
-                (Program::Sweep(sweep), SpeedGains::firm(inertia))
+                (SpeedProgram::Sweep(sweep), SpeedGains::firm(inertia))
             }
-            Scenario::Multisine => (Program::multisine(declared), SpeedGains::loose(inertia)),
+            Scenario::Multisine => {
+                (SpeedProgram::multisine(inertia, &declared.friction), SpeedGains::loose(inertia))
+            }
             _ => {
                 let step = Step { start_s: 0.0, before: 0.0, after: self.target_speed_rad_s };
-                (Program::Step(step), SpeedGains::PAPER)
+                (SpeedProgram::Step(step), SpeedGains::PAPER)
             }
         };
         Ok((program, self.speed_gains.unwrap_or(gains)))

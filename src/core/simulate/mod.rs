@@ -23,10 +23,11 @@ mod simulation;
 mod statistics;
 mod tracking;
 
+pub use crate::control::SpeedGains;
 pub use actuator::Actuator;
 pub use balance_run::{Run, TimedPose};
 pub use bench_plant::BenchPlant;
-pub use bench_run::{BenchRun, SpeedGains};
+pub use bench_run::BenchRun;
 pub use experiment::{ControllerChoice, Experiment, ExperimentError, Outcome, Push, run};
 pub use ground::Ground;
 pub use planar::{Forcing, PlanarPlant, Trial, TrialOutcome, advance_batch, monte_carlo};

@@ -1,6 +1,366 @@
 //! A real robot under control: from what was heard to what is asked of the motors, in stages, within limits,
 //! under watchdogs. Pure: time and all that was heard are arguments.
+//!
+//! One [`Drive::step`] a millisecond, in every stage:
+//! - [`Stage::Listening`]: no order to the motors. [`Listener`] makes samples of what others make the robot do.
+//! - [`Stage::Checking`]: the motors are asked for their state at 200 Hz and their health at 5 Hz, and [`Check`]s say
+//!   what is right, what is to be done, and what is wrong with its mend.
+//! - [`Stage::Driving`]: motors on, torques at 1 kHz, which the motors answer with their state, and health at 5 Hz.
+//!   Every watch and limit of `[safety]` is looked at before a torque is asked for.
+//! - [`Stage::Stopped`]: no torque and motors off in the same step, repeated every 5 ms until both have said that they
+//!   are off; then nothing. A stop out of listening does the same.
+//!
+//! Torques stay within `torque_nm` and change by `torque_slew_nm_s` at most, both of `[limits]`; only the stop is not
+//! slewed. Way, heading and motor angles count from where the robot was armed, motor angles such that
+//! x = r (q + θ) = 0 there; while checking, from the first reading.
 
+mod checks;
+mod estimate;
+mod exchange;
+mod handover;
+mod listener;
+mod program;
+mod sign;
 mod stage;
+mod switching;
+mod watch;
 
+pub use exchange::{DriveError, DriveEvent, DriveSettings, Inputs, Orders, Output};
+pub use listener::Listener;
 pub use stage::{Check, CheckResult, DriveOrder, Excitation, Stage, StopReason};
+
+use std::time::Duration;
+
+use crate::control::{BalanceController, Reference};
+use crate::link::MotorOrder;
+use crate::model_file::RobotModel;
+use crate::record::{BenchSample, Sample};
+use crate::robot::{State, TICK_S};
+use checks::Checks;
+use estimate::Estimator;
+use program::Program;
+use switching::Switching;
+use watch::Watch;
+
+/// Time between two queries of the motors' health, and of their state where no torque is asked for.
+const HEALTH_PERIOD: Duration = Duration::from_millis(200);
+const STATE_PERIOD: Duration = Duration::from_millis(5);
+/// Time between two looks at the checks.
+const CHECK_PERIOD: Duration = Duration::from_millis(50);
+/// Longest time until a motor has said that it is on.
+const ON_TIMEOUT: Duration = Duration::from_millis(200);
+/// Steps of the current command (LK protocol).
+const CURRENT_STEPS: f64 = 2048.0;
+
+/// A robot that is driven, or may be.
+#[derive(Clone, Debug)]
+pub struct Drive {
+    robot: Box<RobotModel>,
+    settings: DriveSettings,
+    torque_limit_nm: f64,
+    /// Greatest change of a torque in one tick, N m.
+    slew_nm: f64,
+    stage: Stage,
+    watch: Watch,
+    estimator: Estimator,
+    program: Program,
+    checks: Checks,
+    reference: Reference,
+    asked_nm: [f64; 2],
+    armed: Duration,
+    switching: Option<Switching>,
+    next_health: Duration,
+    next_state: Duration,
+    next_checks: Duration,
+    last_step: Option<Duration>,
+}
+
+impl Drive {
+    /// A robot that is listened to, before the first step.
+    ///
+    /// # Errors
+    /// A model that does not say how much torque a current makes or how much is allowed, or is out of range, and a
+    /// sweep that is too short.
+    pub fn new(
+        robot: &RobotModel,
+        controller: BalanceController,
+        excitation: Excitation,
+        settings: DriveSettings,
+    ) -> Result<Self, DriveError> {
+        robot.validate()?;
+        let torque_limit_nm = torque_limit(robot)?;
+        let program = Program::new(robot, controller, excitation, torque_limit_nm)?;
+        Ok(Self {
+            settings,
+            torque_limit_nm,
+            slew_nm: robot.limits.torque_slew_nm_s.map_or(f64::INFINITY, |slew| slew * TICK_S),
+            stage: Stage::Listening,
+            watch: Watch::new(),
+            estimator: Estimator::new(robot),
+            checks: Checks::new(program.balances()),
+            program,
+            reference: Reference::default(),
+            asked_nm: [0.0; 2],
+            armed: Duration::ZERO,
+            switching: None,
+            next_health: Duration::ZERO,
+            next_state: Duration::ZERO,
+            next_checks: Duration::ZERO,
+            last_step: None,
+            robot: Box::new(robot.clone()),
+        })
+    }
+
+    /// How far the robot is from being driven.
+    pub fn stage(&self) -> Stage {
+        self.stage
+    }
+
+    /// What has to be right before it is, as far as known; of the last time of checking.
+    pub fn checks(&self) -> &[Check] {
+        self.checks.list()
+    }
+
+    /// Largest torque that is asked of a motor, N m.
+    pub fn torque_limit_nm(&self) -> f64 {
+        self.torque_limit_nm
+    }
+
+    /// One tick.
+    pub fn step(&mut self, now: Duration, inputs: &Inputs<'_>) -> Output {
+        let mut output = Output::default();
+        self.watch.hear(inputs);
+        self.estimator.hear(self.watch.states(), self.watch.imu.last);
+        if let Some(switching) = &mut self.switching {
+            switching.hear(inputs.motors);
+        }
+        for order in inputs.orders {
+            self.obey(now, order, &mut output);
+        }
+        match self.stage {
+            Stage::Listening => {}
+            Stage::Checking => self.check(now, &mut output),
+            Stage::Driving => self.drive(now, inputs, &mut output),
+            Stage::Stopped(_) => self.switch(now, &mut output),
+        }
+        self.last_step = Some(now);
+        output
+    }
+
+    fn obey(&mut self, now: Duration, order: &DriveOrder, output: &mut Output) {
+        match (order, self.stage) {
+            (DriveOrder::Stop, Stage::Stopped(_)) => {}
+            (DriveOrder::Stop, _) => self.stop(now, StopReason::Asked, output),
+            (DriveOrder::Check, Stage::Listening) => self.begin_checks(now, output),
+            (DriveOrder::Arm, Stage::Checking) => self.arm(now, output),
+            (DriveOrder::Release, Stage::Checking | Stage::Stopped(_)) => self.release(output),
+            (DriveOrder::Release, Stage::Listening) => {}
+            (DriveOrder::Controller(controller), stage) => self.take_over(**controller, stage, output),
+            (DriveOrder::Reference(reference), _) => self.refer_to(reference, output),
+            (DriveOrder::Check, _) => refuse(output, "to check the robot, release it first"),
+            (DriveOrder::Arm, _) => refuse(output, "to arm the robot, let it be checked first"),
+            (DriveOrder::Release, Stage::Driving) => refuse(output, "to release the robot, stop it first"),
+        }
+    }
+
+    fn begin_checks(&mut self, now: Duration, output: &mut Output) {
+        self.checks = Checks::new(self.program.balances());
+        (self.next_health, self.next_state, self.next_checks) = (now, now, now);
+        self.reach(Stage::Checking, output);
+    }
+
+    fn arm(&mut self, now: Duration, output: &mut Output) {
+        self.checks.judge(now, &self.watch, &self.robot);
+        if let Some(open) = self.checks.open() {
+            let text = format!("not armed, because of {}: {}", open.name, open.text);
+            output.events.push(DriveEvent::Warning(text));
+            return;
+        }
+        self.estimator.count_from_here();
+        self.program.start();
+        self.reference = Reference::default();
+        self.asked_nm = [0.0; 2];
+        self.armed = now;
+        self.next_health = now + HEALTH_PERIOD;
+        self.switching = Some(Switching::on(now));
+        self.reach(Stage::Driving, output);
+    }
+
+    fn release(&mut self, output: &mut Output) {
+        if let Some(motor) = self.switching.take().and_then(|switching| switching.missing()) {
+            let text = format!("the {motor} motor has never said that it is off: switch its supply off");
+            output.events.push(DriveEvent::Warning(text));
+        }
+        self.reach(Stage::Listening, output);
+    }
+
+    fn take_over(&mut self, controller: BalanceController, stage: Stage, output: &mut Output) {
+        let Program::Balance { controller: handover, .. } = &mut self.program else {
+            return refuse(output, "wheels in the air are under speed control and take no other controller");
+        };
+        if !controller.gain.iter().all(|gain| gain.is_finite()) {
+            return refuse(output, "the new controller has a gain that is no number and is not taken");
+        }
+        handover.hand_over(controller);
+        if stage != Stage::Driving {
+            handover.finish();
+        }
+        output.events.push(DriveEvent::Note("another controller takes over"));
+    }
+
+    fn refer_to(&mut self, reference: &Reference, output: &mut Output) {
+        let State { x_m, x_dot_m_s, pitch_rad, pitch_rate_rad_s } = reference.state;
+        let finite =
+            [x_m, x_dot_m_s, pitch_rad, pitch_rate_rad_s, reference.yaw_rad].iter().all(|v| v.is_finite());
+        if finite && x_m.abs() <= self.robot.safety.distance_m {
+            self.reference = *reference;
+        } else {
+            refuse(output, "a reference that is no number or beyond distance_m in [safety] is not taken");
+        }
+    }
+
+    fn check(&mut self, now: Duration, output: &mut Output) {
+        self.checks.observe(&self.watch);
+        if due(&mut self.next_state, now, STATE_PERIOD) {
+            output.orders.push(MotorOrder::ReadState);
+        }
+        if due(&mut self.next_health, now, HEALTH_PERIOD) {
+            output.orders.push(MotorOrder::ReadHealth);
+        }
+        if due(&mut self.next_checks, now, CHECK_PERIOD) {
+            self.checks.judge(now, &self.watch, &self.robot);
+        }
+        output.sample = self.estimator.readings().map(|readings| {
+            Sample::new(now.as_secs_f64(), &readings, &self.estimator.held(&readings).state, [0.0; 2])
+        });
+    }
+
+    fn drive(&mut self, now: Duration, inputs: &Inputs<'_>, output: &mut Output) {
+        let time_s = (now - self.armed).as_secs_f64();
+        let Some(readings) = self.estimator.readings() else {
+            return self.stop(now, StopReason::NotFinite, output);
+        };
+        let held = self.estimator.held(&readings);
+        let problem = self.problem(now, inputs, &held.state, readings.motor_speed_rad_s);
+        if let Some(reason) = problem {
+            return self.stop(now, reason, output);
+        }
+        if self.program.is_done(time_s) {
+            return self.stop(now, StopReason::Done, output);
+        }
+        let balances = self.program.balances();
+        let measurement = if balances && self.settings.latency_compensation {
+            self.estimator.at_action(now, &readings)
+        } else {
+            held
+        };
+        let wanted = self.program.step(time_s, &measurement, &self.reference);
+        let asked: [f64; 2] = std::array::from_fn(|motor| self.slewed(motor, wanted[motor]));
+        if !asked.iter().all(|torque| torque.is_finite()) {
+            return self.stop(now, StopReason::NotFinite, output);
+        }
+        self.asked_nm = asked;
+        self.estimator.remember_asked(now, asked);
+        self.switch(now, output);
+        output.orders.push(MotorOrder::Torque(asked));
+        if due(&mut self.next_health, now, HEALTH_PERIOD) {
+            output.orders.push(MotorOrder::ReadHealth);
+        }
+        output.sample = Some(Sample::new(now.as_secs_f64(), &readings, &held.state, asked));
+        output.bench = self.program.target_rad_s(time_s).map(|target_speed_rad_s| BenchSample {
+            time_s: now.as_secs_f64(),
+            motor_angle_rad: readings.motor_angle_rad,
+            motor_speed_rad_s: readings.motor_speed_rad_s,
+            torque_nm: asked,
+            target_speed_rad_s,
+        });
+    }
+
+    fn problem(
+        &self,
+        now: Duration,
+        inputs: &Inputs<'_>,
+        state: &State,
+        motor_speed_rad_s: [f64; 2],
+    ) -> Option<StopReason> {
+        let limits = &self.robot.safety;
+        let late = inputs.late.max(watch::lateness(now, self.last_step));
+        let inputs = Inputs { late, ..*inputs };
+        let balances = self.program.balances();
+        self.watch
+            .problem(now, &inputs, limits, self.armed)
+            .or_else(|| self.never_on(now))
+            .or_else(|| self.watch.imu.frozen(now, limits, balances))
+            .or_else(|| {
+                if balances {
+                    watch::out_of_bounds(state, limits)
+                } else {
+                    watch::too_fast(motor_speed_rad_s, limits)
+                }
+            })
+    }
+
+    /// A motor that has not said that it is on.
+    fn never_on(&self, now: Duration) -> Option<StopReason> {
+        let switching = self.switching.as_ref().filter(|on| now > on.since() + ON_TIMEOUT)?;
+        switching.missing().map(|motor| StopReason::MotorOff { motor })
+    }
+
+    fn slewed(&self, motor: usize, wanted_nm: f64) -> f64 {
+        let last = self.asked_nm[motor];
+        last + (wanted_nm - last).clamp(-self.slew_nm, self.slew_nm)
+    }
+
+    /// No torque and motors off, in this very step.
+    fn stop(&mut self, now: Duration, reason: StopReason, output: &mut Output) {
+        output.orders = Orders::default();
+        self.asked_nm = [0.0; 2];
+        self.switching = Some(Switching::off(now));
+        self.reach(Stage::Stopped(reason), output);
+        self.switch(now, output);
+    }
+
+    /// Switches the motors on or off until they have said so; each order to be off comes with one of no torque.
+    fn switch(&mut self, now: Duration, output: &mut Output) {
+        let Some(switching) = &mut self.switching else { return };
+        if let Some(order) = switching.due(now) {
+            if order == MotorOrder::Off {
+                output.orders.push(MotorOrder::Torque([0.0; 2]));
+            }
+            output.orders.push(order);
+        }
+        if switching.is_done() {
+            self.switching = None;
+        }
+    }
+
+    fn reach(&mut self, stage: Stage, output: &mut Output) {
+        self.stage = stage;
+        output.events.push(DriveEvent::Stage(stage));
+    }
+}
+
+fn refuse(output: &mut Output, reason: &str) {
+    output.events.push(DriveEvent::Warning(reason.to_owned()));
+}
+
+/// Whether it is time for something periodic.
+fn due(next: &mut Duration, now: Duration, period: Duration) -> bool {
+    let is_due = now >= *next;
+    if is_due {
+        *next = now + period;
+    }
+    is_due
+}
+
+/// The model's limit, within what the current command can ask for.
+fn torque_limit(robot: &RobotModel) -> Result<f64, DriveError> {
+    let link = &robot.link;
+    let constant = link.torque_constant_nm_a.ok_or(DriveError::NoTorqueConstant)?;
+    let limit_nm = robot.limits.torque_nm.ok_or(DriveError::NoTorqueLimit)?;
+    let greatest_nm = CURRENT_STEPS / link.current_steps_per_a * constant;
+    if limit_nm > greatest_nm {
+        return Err(DriveError::TorqueLimit { limit_nm, greatest_nm });
+    }
+    Ok(limit_nm)
+}

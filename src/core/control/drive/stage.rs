@@ -35,7 +35,7 @@ impl Stage {
 pub enum DriveOrder {
     /// First step of arming: from listening to checking.
     Check,
-    /// Second step: from checking to driving; refused while a check has failed.
+    /// Second step: from checking to driving; refused until every check has passed.
     Arm,
     /// No torque, motors off, at once.
     Stop,
@@ -47,7 +47,7 @@ pub enum DriveOrder {
     Reference(Reference),
 }
 
-/// What the motors are to do once driven.
+/// What the motors are to do once armed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Excitation {
     /// Balance.
@@ -103,8 +103,10 @@ pub enum StopReason {
         /// What it reports.
         errors: MotorErrors,
     },
-    /// A motor has switched itself off.
-    #[error("the {motor} motor has switched itself off: read its errors")]
+    /// A motor is off that is to be on.
+    #[error(
+        "the {motor} motor is off: it has switched itself off, or has never taken the order to switch on"
+    )]
     MotorOff {
         /// Which.
         motor: Motor,

@@ -1,0 +1,312 @@
+//! What has to be right before a robot is armed.
+
+use std::time::Duration;
+
+use super::sign::{Rocking, Slope};
+use super::stage::{Check, CheckResult};
+use super::watch::Watch;
+use crate::link::MotorHealth;
+use crate::model_file::RobotModel;
+use crate::robot::Motor;
+
+/// A motor or an IMU answers if it was heard within this time, s; motors are asked for their health at 5 Hz.
+const FRESH_S: f64 = 0.5;
+/// Share of the IMU's rate that has to be there.
+const RATE_SHARE: f64 = 0.9;
+/// Largest pitch, rad, and pitch rate, rad/s, at which a robot is let go.
+const UPRIGHT_RAD: f64 = 0.15;
+const CALM_RAD_S: f64 = 0.5;
+/// Greatest difference of pitch and tilt from acceleration, rad, and time constant of its mean, s: a body that is
+/// rocked by hand is accelerated as well.
+const TILT_APART_RAD: f64 = 0.1;
+const TILT_MEMORY_S: f64 = 1.0;
+
+/// The checks, and what they remember of the readings.
+#[derive(Clone, Debug)]
+pub(super) struct Checks {
+    balancing: bool,
+    list: Vec<Check>,
+    rocking: Rocking,
+    /// What rocking has told so far; later rocking may tell otherwise.
+    slopes: [Slope; 2],
+    /// Mean of tilt less pitch, rad.
+    tilt_apart_rad: Option<f64>,
+    last_imu: Option<Duration>,
+}
+
+impl Checks {
+    pub(super) fn new(balancing: bool) -> Self {
+        Self {
+            balancing,
+            list: Vec::new(),
+            rocking: Rocking::default(),
+            slopes: [Slope::Unknown; 2],
+            tilt_apart_rad: None,
+            last_imu: None,
+        }
+    }
+
+    pub(super) fn list(&self) -> &[Check] {
+        &self.list
+    }
+
+    /// The first one that has failed, or else is waited for.
+    pub(super) fn open(&self) -> Option<&Check> {
+        let failed = self.list.iter().find(|check| check.result == CheckResult::Failed);
+        failed.or_else(|| self.list.iter().find(|check| check.result == CheckResult::Waiting))
+    }
+
+    /// Takes a new reading of the IMU, with the motor angles then.
+    pub(super) fn observe(&mut self, watch: &Watch) {
+        let Some(imu) = watch.imu.last else { return };
+        let [Some(left), Some(right)] = watch.motors.map(|motor| motor.state) else { return };
+        if self.last_imu.is_some_and(|last| last >= imu.time) {
+            return;
+        }
+        let dt_s = self.last_imu.map_or(0.0, |last| (imu.time - last).as_secs_f64());
+        self.last_imu = Some(imu.time);
+        self.rocking.add(dt_s, imu.pitch_rad, [left.angle_rad, right.angle_rad]);
+        for (known, found) in self.slopes.iter_mut().zip(self.rocking.slopes()) {
+            if found != Slope::Unknown {
+                *known = found;
+            }
+        }
+        if let Some(tilt_rad) = imu.tilt_rad {
+            let apart = near_zero(tilt_rad - imu.pitch_rad);
+            let mean = self.tilt_apart_rad.get_or_insert(apart);
+            *mean += near_zero(apart - *mean) * (1.0 - libm::exp(-dt_s / TILT_MEMORY_S));
+        }
+    }
+
+    /// How everything stands now.
+    pub(super) fn judge(&mut self, now: Duration, watch: &Watch, robot: &RobotModel) {
+        let mut list = std::mem::take(&mut self.list);
+        list.clear();
+        let ids = robot.link.motor_ids();
+        list.extend([Motor::Left, Motor::Right].map(|motor| answers(now, watch, motor, ids)));
+        list.push(nobody_else(now, watch));
+        list.extend(of_health(watch, robot));
+        list.push(self.imu_rate(now, watch, robot));
+        list.push(self.imu_alive(now, watch, robot));
+        list.push(self.gravity());
+        if self.balancing {
+            list.push(upright(watch, robot));
+            list.push(self.directions());
+        }
+        self.list = list;
+    }
+
+    fn imu_rate(&self, now: Duration, watch: &Watch, robot: &RobotModel) -> Check {
+        const NAME: &str = "IMU rate";
+        let set_hz = f64::from(robot.link.imu_rate_hz);
+        let fresh = watch.imu.last.is_some_and(|last| is_fresh(now, last.time));
+        match watch.imu.rate_hz() {
+            _ if !fresh => failed(
+                NAME,
+                "the IMU is silent: look at its cable, port and baud rate (115200 for 200 Hz)".to_owned(),
+            ),
+            None => waiting(NAME, "counting".to_owned()),
+            Some(rate_hz) if rate_hz < RATE_SHARE * set_hz => failed(
+                NAME,
+                format!(
+                    "{rate_hz:.0} readings a second in place of {set_hz}: set the IMU's rate and baud rate, or \
+                     imu_rate_hz in [link]"
+                ),
+            ),
+            Some(rate_hz) => passed(NAME, format!("{rate_hz:.0} readings a second")),
+        }
+    }
+
+    fn imu_alive(&self, now: Duration, watch: &Watch, robot: &RobotModel) -> Check {
+        const NAME: &str = "IMU moves";
+        let Some(last) = watch.imu.last else { return waiting(NAME, "not heard yet".to_owned()) };
+        let frozen = watch.imu.frozen(now, &robot.safety, self.balancing);
+        match frozen {
+            Some(problem) if last.tilt_rad.is_some() => failed(NAME, problem.to_string()),
+            // Without acceleration a quiet IMU may say the same again and again.
+            Some(problem) => waiting(NAME, format!("{problem}, or move the robot")),
+            None => passed(NAME, "its readings change".to_owned()),
+        }
+    }
+
+    fn gravity(&self) -> Check {
+        const NAME: &str = "IMU and gravity";
+        let Some(apart) = self.tilt_apart_rad else {
+            let nothing = "the IMU sends no acceleration to compare its pitch with".to_owned();
+            return if self.last_imu.is_some() { passed(NAME, nothing) } else { waiting(NAME, nothing) };
+        };
+        if apart.abs() <= TILT_APART_RAD {
+            return passed(
+                NAME,
+                format!("pitch and the direction of gravity agree within {:.3} rad", apart.abs()),
+            );
+        }
+        let found = format!("gravity says {apart:.2} rad more than the pitch");
+        let mend = if apart.abs() > 2.0 {
+            "the IMU is mounted upside down, or its horizontal was never calibrated"
+        } else {
+            "choose the other pitch_axis in [link] if the IMU is mounted turned, or calibrate its horizontal"
+        };
+        failed(NAME, format!("{found}: {mend}"))
+    }
+
+    /// Whether encoders and IMU count forward as the robot does.
+    fn directions(&self) -> Check {
+        const NAME: &str = "directions";
+        use Slope::{EncoderScale, Reversed, Right, Unclear, Unknown};
+        match self.slopes {
+            [Right, Right] => passed(NAME, "both motors turn back by as much as the body leans forward".to_owned()),
+            [Reversed, Reversed] => failed(
+                NAME,
+                "the IMU is mounted the other way round: turn pitch_direction in [link] over (or left_direction and \
+                 right_direction, if the pitch shown rises as the body leans forward)"
+                    .to_owned(),
+            ),
+            [Reversed, _] => failed(NAME, reversed(Motor::Left)),
+            [_, Reversed] => failed(NAME, reversed(Motor::Right)),
+            [EncoderScale(times), _] => failed(NAME, wrong_steps(Motor::Left, times)),
+            [_, EncoderScale(times)] => failed(NAME, wrong_steps(Motor::Right, times)),
+            [Unclear, _] | [_, Unclear] => waiting(
+                NAME,
+                "motors and body do not turn by the same angle: keep the wheels on the ground, hold the robot so that \
+                 it does not roll, and rock its body slowly by 0.1 rad"
+                    .to_owned(),
+            ),
+            [Unknown, _] | [_, Unknown] => waiting(
+                NAME,
+                "rock the body slowly by 0.1 rad, wheels on the ground and not rolling".to_owned(),
+            ),
+        }
+    }
+}
+
+fn answers(now: Duration, watch: &Watch, motor: Motor, ids: [u8; 2]) -> Check {
+    let name = ["left motor", "right motor"][motor as usize];
+    let heard = |motor: Motor| {
+        let watch = &watch.motors[motor as usize];
+        [watch.state.map(|state| state.time), watch.health.map(|health| health.time)]
+            .map(|time| time.is_some_and(|time| is_fresh(now, time)))
+    };
+    let id = ids[motor as usize];
+    let key = ["left_motor_id", "right_motor_id"][motor as usize];
+    let other = Motor::BOTH[1 - motor as usize];
+    match heard(motor) {
+        [true, true] => passed(name, format!("id {id} answers")),
+        [false, false] if heard(other) == [false, false] => failed(
+            name,
+            format!("id {id} is silent, and so is the other motor: look at supply, wiring and bit rate"),
+        ),
+        [false, false] => failed(
+            name,
+            format!(
+                "id {id} is silent while id {} answers: look at its cable, and at {key} in [link] (its blinking light \
+                 counts the id)",
+                ids[other as usize]
+            ),
+        ),
+        [true, false] => waiting(name, format!("id {id} has not told voltage and errors yet")),
+        [false, true] => waiting(name, format!("id {id} has not told angle and speed yet")),
+    }
+}
+
+/// Nobody asks the motors for torque while they are only queried.
+fn nobody_else(now: Duration, watch: &Watch) -> Check {
+    const NAME: &str = "no other controller";
+    let heard = |time: Duration| is_fresh(now, time);
+    if watch.motors.iter().any(|motor| motor.commanded.is_some_and(heard)) {
+        let mend = "another controller on the bus commands the motors: switch it off".to_owned();
+        return failed(NAME, mend);
+    }
+    passed(NAME, "nobody else commands the motors".to_owned())
+}
+
+fn of_health(watch: &Watch, robot: &RobotModel) -> [Check; 3] {
+    const NAMES: [&str; 3] = ["temperature", "voltage", "motor errors"];
+    let [Some(left), Some(right)] = watch.motors.map(|motor| motor.health) else {
+        return NAMES.map(|name| waiting(name, "not told yet".to_owned()));
+    };
+    let both = [left, right];
+    let limits = &robot.safety;
+    let temperatures = watch.motors.map(|motor| motor.temperature_c().unwrap_or(0.0));
+    let hottest = temperatures.into_iter().fold(f64::NEG_INFINITY, f64::max);
+    let temperature = if hottest > limits.temperature_c {
+        failed(NAMES[0], format!("{hottest} °C, above {} °C: let the motors cool down", limits.temperature_c))
+    } else {
+        passed(NAMES[0], format!("{} and {} °C", temperatures[0], temperatures[1]))
+    };
+    [temperature, voltage(NAMES[1], &both, robot), errors(NAMES[2], &both)]
+}
+
+fn voltage(name: &'static str, both: &[MotorHealth; 2], robot: &RobotModel) -> Check {
+    let [least, greatest] = [robot.safety.least_voltage_v, robot.safety.greatest_voltage_v];
+    let outside = both.iter().map(|health| health.voltage_v).find(|v| !(least..=greatest).contains(v));
+    match outside {
+        None => passed(name, format!("{:.1} and {:.1} V", both[0].voltage_v, both[1].voltage_v)),
+        Some(found) => failed(
+            name,
+            format!(
+                "{found:.1} V, not from {least} to {greatest} V: charge or check the battery; if the voltage is right, \
+                 set state_layout in [link] or the limits in [safety]"
+            ),
+        ),
+    }
+}
+
+fn errors(name: &'static str, both: &[MotorHealth; 2]) -> Check {
+    let wrong = Motor::BOTH.into_iter().zip(both).find(|(_, health)| !health.errors.is_none());
+    match wrong {
+        None => passed(name, "none".to_owned()),
+        Some((motor, health)) => failed(
+            name,
+            format!(
+                "the {motor} motor reports {}: remove the cause, then switch it off and on",
+                health.errors
+            ),
+        ),
+    }
+}
+
+fn upright(watch: &Watch, robot: &RobotModel) -> Check {
+    const NAME: &str = "upright";
+    let Some(imu) = watch.imu.last else { return waiting(NAME, "pitch not known yet".to_owned()) };
+    let allowed = UPRIGHT_RAD.min(0.5 * robot.safety.tilt_rad);
+    if imu.pitch_rad.abs() > allowed || imu.pitch_rate_rad_s.abs() > CALM_RAD_S {
+        let found = format!(
+            "pitch {:.3} rad at {:.2} rad/s: hold the robot upright within {allowed} rad and still",
+            imu.pitch_rad, imu.pitch_rate_rad_s
+        );
+        return waiting(NAME, found);
+    }
+    passed(NAME, format!("pitch {:.3} rad", imu.pitch_rad))
+}
+
+fn reversed(motor: Motor) -> String {
+    format!("the {motor} motor counts backward: turn {motor}_direction in [link] over")
+}
+
+fn wrong_steps(motor: Motor, times: f64) -> String {
+    format!(
+        "the {motor} motor turns {times:.2} times as far as the body: set encoder_steps in [link], 65536 or 16384"
+    )
+}
+
+fn is_fresh(now: Duration, time: Duration) -> bool {
+    now.saturating_sub(time).as_secs_f64() <= FRESH_S
+}
+
+/// An angle within half a turn from 0.
+fn near_zero(angle_rad: f64) -> f64 {
+    libm::remainder(angle_rad, std::f64::consts::TAU)
+}
+
+fn passed(name: &'static str, text: String) -> Check {
+    Check { name, result: CheckResult::Passed, text }
+}
+
+fn waiting(name: &'static str, text: String) -> Check {
+    Check { name, result: CheckResult::Waiting, text }
+}
+
+fn failed(name: &'static str, text: String) -> Check {
+    Check { name, result: CheckResult::Failed, text }
+}

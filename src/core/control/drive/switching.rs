@@ -1,0 +1,72 @@
+//! Motors that are switched on or off, until both have said that they are.
+
+use std::time::Duration;
+
+use crate::link::{MotorEvent, MotorOrder};
+use crate::robot::Motor;
+
+/// Time between two orders of the same kind.
+const REPEAT: Duration = Duration::from_millis(5);
+/// Command bytes that are acknowledged (LK protocol).
+const OFF: u8 = 0x80;
+const ON: u8 = 0x88;
+
+/// One order, repeated until acknowledged.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Switching {
+    order: MotorOrder,
+    since: Duration,
+    next: Duration,
+    acknowledged: [bool; 2],
+}
+
+impl Switching {
+    pub(super) fn on(now: Duration) -> Self {
+        Self::new(MotorOrder::On, now)
+    }
+
+    pub(super) fn off(now: Duration) -> Self {
+        Self::new(MotorOrder::Off, now)
+    }
+
+    fn new(order: MotorOrder, now: Duration) -> Self {
+        Self { order, since: now, next: now, acknowledged: [false; 2] }
+    }
+
+    /// Takes what the motors have said since the order was first given; health that says so will do as well.
+    pub(super) fn hear(&mut self, events: &[MotorEvent]) {
+        let wanted = if self.order == MotorOrder::On { ON } else { OFF };
+        for event in events {
+            let (motor, time, done) = match *event {
+                MotorEvent::Acknowledged { motor, time, command } => (motor, time, command == wanted),
+                MotorEvent::Health(motor, health) => (motor, health.time, health.on == Some(wanted == ON)),
+                _ => continue,
+            };
+            self.acknowledged[motor as usize] |= done && time >= self.since;
+        }
+    }
+
+    /// The order, where it is time to give it (again).
+    pub(super) fn due(&mut self, now: Duration) -> Option<MotorOrder> {
+        if self.is_done() || now < self.next {
+            return None;
+        }
+        self.next = now + REPEAT;
+        Some(self.order)
+    }
+
+    /// Whether both motors have said so.
+    pub(super) fn is_done(&self) -> bool {
+        self.acknowledged == [true; 2]
+    }
+
+    /// A motor that has not answered.
+    pub(super) fn missing(&self) -> Option<Motor> {
+        Motor::BOTH.into_iter().find(|&motor| !self.acknowledged[motor as usize])
+    }
+
+    /// When the order was first given.
+    pub(super) fn since(&self) -> Duration {
+        self.since
+    }
+}
