@@ -4,6 +4,7 @@
 //! are in [`crate::device`].
 
 mod bus;
+mod emulator;
 mod faulty;
 mod frame;
 mod imu;
@@ -14,6 +15,7 @@ mod motors;
 mod wheels;
 
 pub use bus::{Bus, BusError};
+pub use emulator::{EmulatedBus, Emulator, EmulatorSettings, Fault, FaultError, Place, TimedFault};
 pub use faulty::{FaultCounts, FaultRates, Faulty};
 pub use frame::{Direction, Frame, FrameId, FrameKind, StampedFrame};
 pub use imu::{ImuAssembler, ImuReading};
