@@ -4,6 +4,8 @@
 //! are in [`crate::device`].
 
 mod bus;
+pub mod bus_load;
+pub mod candump;
 mod emulator;
 mod faulty;
 mod frame;
@@ -12,6 +14,7 @@ pub mod jy901;
 pub mod lk;
 mod loopback;
 mod motors;
+pub mod slcan;
 mod wheels;
 
 pub use bus::{Bus, BusError};
