@@ -7,13 +7,15 @@
 //!   friction nor the scale of the torque matters.
 //! - From the motors' reading to the new torque, which the model says is `actuation.delay_s` later, the linear model
 //!   (Eq. 11) moves on under the torques that have been asked for already and have not acted yet, less the friction of
-//!   the model; the turning robot goes on turning at its rate.
+//!   the model, which holds a shaft that it can stop within a step; the turning robot goes on turning at its rate.
+//! - The mean of the motor speeds, read in steps of 1 deg/s, is smoothed by the same model: each tick it moves on under
+//!   the torques that act, and takes three tenths of what the reading says otherwise.
 
 use std::collections::VecDeque;
 use std::time::Duration;
 
 use crate::control::{Measurement, Odometry, Readings};
-use crate::friction::{Compensation, Feedforward};
+use crate::friction::Stribeck;
 use crate::link::{ImuReading, MotorState};
 use crate::model_file::RobotModel;
 use crate::robot::{Coefficients, TICK_S};
@@ -23,23 +25,26 @@ const REMEMBERED: usize = 128;
 /// The longest way that is bridged, s; the linear model's fastest pole is not to take an error along by more than
 /// a half.
 const LONGEST_BRIDGE_S: f64 = 0.05;
-/// Speed over which friction turns over, rad/s: a shaft at rest is then held as by a viscous damper, which is stable
-/// in steps of 1 ms.
-const FRICTION_TURNS_RAD_S: f64 = 0.05;
+/// Share of a reading's surprise that the smoothed motor speed takes each tick.
+const SMOOTHING: f64 = 0.3;
+/// Time after which it begins anew, s.
+const LONGEST_GAP_S: f64 = 0.02;
+/// Opposite speeds of the motors beyond which the robot turns on the spot and friction has no common direction, rad/s.
+const TURNING_RAD_S: f64 = 0.05;
 
 /// What the sensors said last, and what has been asked of the motors.
 #[derive(Clone, Debug)]
 pub(super) struct Estimator {
     odometry: Odometry,
     laws: Coefficients,
-    friction: [Option<Feedforward>; 2],
+    friction: [Option<Stribeck>; 2],
     delay_s: f64,
     imu_latency_s: f64,
     motors: [Option<MotorState>; 2],
     imu: Option<ImuReading>,
     /// Angles of the motors at which the robot is where it counts from, rad.
     origin_rad: Option<[f64; 2]>,
-    /// Mean of the motor speeds over time, oldest first.
+    /// Smoothed mean of the motor speeds over time, oldest first.
     speeds: VecDeque<(Duration, f64)>,
     /// Torques and when they were asked for, oldest first.
     asked: VecDeque<(Duration, [f64; 2])>,
@@ -52,14 +57,18 @@ struct Pitch {
     rate_rad_s: f64,
 }
 
+/// What the model makes of a step.
+struct Motion {
+    speed_rad_s: f64,
+    pitch_accel_rad_s2: f64,
+}
+
 impl Estimator {
     pub(super) fn new(robot: &RobotModel) -> Self {
-        let compensation = Compensation { ratio: 1.0, smoothing_speed_rad_s: FRICTION_TURNS_RAD_S };
-        let friction = robot.friction.map(|curve| curve.and_then(|c| Feedforward::new(c, compensation).ok()));
         Self {
             odometry: Odometry::new(robot),
             laws: robot.parameters.coefficients(),
-            friction,
+            friction: robot.friction,
             delay_s: robot.actuation.delay_s,
             imu_latency_s: robot.sensors.imu_latency_s,
             motors: [None; 2],
@@ -71,15 +80,31 @@ impl Estimator {
     }
 
     /// Takes the newest reading of each sensor.
-    pub(super) fn hear(&mut self, motors: [Option<MotorState>; 2], imu: Option<ImuReading>) {
+    pub(super) fn hear(&mut self, now: Duration, motors: [Option<MotorState>; 2], imu: Option<ImuReading>) {
         (self.motors, self.imu) = (motors, imu);
         let Some((time, [left, right])) = self.heard() else { return };
         if self.speeds.back().is_none_or(|&(last, _)| last < time) {
-            remember(&mut self.speeds, (time, f64::midpoint(left.speed_rad_s, right.speed_rad_s)));
+            let read = f64::midpoint(left.speed_rad_s, right.speed_rad_s);
+            let speed = self.smoothed(now, time, read, [left.speed_rad_s, right.speed_rad_s]);
+            remember(&mut self.speeds, (time, speed));
         }
         if self.origin_rad.is_none() {
             self.count_from_here();
         }
+    }
+
+    /// The mean motor speed at a reading: what the model made of the one before, and a share of what was read.
+    fn smoothed(&self, now: Duration, time: Duration, read: f64, speeds: [f64; 2]) -> f64 {
+        let Some(&(last, before)) = self.speeds.back() else { return read };
+        let dt_s = (time - last).as_secs_f64();
+        if dt_s > LONGEST_GAP_S {
+            return read;
+        }
+        let pitch = self.imu.map_or(0.0, |imu| imu.pitch_rad);
+        let expected =
+            self.motion(pitch, before, self.acting(now, self.delay_s + dt_s), speeds, dt_s).speed_rad_s;
+        let share = 1.0 - libm::pow(1.0 - SMOOTHING, dt_s / TICK_S);
+        expected + share * (read - expected)
     }
 
     /// Remembers what has been asked of the motors.
@@ -117,10 +142,16 @@ impl Estimator {
     pub(super) fn at_action(&self, now: Duration, readings: &Readings) -> Measurement {
         let Some(((heard, _), imu)) = self.heard().zip(self.imu) else { return self.held(readings) };
         let pitch = self.pitch_with_motors(&imu, heard, readings);
+        let mut readings = *readings;
+        let [left, right] = readings.motor_speed_rad_s;
+        if let Some(&(_, smoothed)) = self.speeds.back() {
+            readings.motor_speed_rad_s =
+                [left, right].map(|speed| speed - f64::midpoint(left, right) + smoothed);
+        }
         // A reading that is at most a tick old is what the delay is counted from; an older one waits for one that
         // was lost.
         let lost_s = (now.saturating_sub(heard).as_secs_f64() - TICK_S).max(0.0);
-        self.moved_on(now, (self.delay_s + lost_s).min(LONGEST_BRIDGE_S), readings, pitch)
+        self.moved_on(now, (self.delay_s + lost_s).min(LONGEST_BRIDGE_S), &readings, pitch)
     }
 
     /// The newest readings of both motors, and the time of the later one.
@@ -151,7 +182,7 @@ impl Estimator {
         pitch
     }
 
-    /// Mean motor speed at a time: that of the nearest readings, by a straight line between them.
+    /// Smoothed mean motor speed at a time, by a straight line between readings.
     fn speed_at(&self, time: Duration) -> f64 {
         let next = self.speeds.partition_point(|&(t, _)| t < time);
         match (next.checked_sub(1).and_then(|i| self.speeds.get(i)), self.speeds.get(next)) {
@@ -166,37 +197,75 @@ impl Estimator {
 
     /// The linear model from the motors' reading on for `way_s`, up to where a torque that is asked for `now` acts.
     fn moved_on(&self, now: Duration, way_s: f64, readings: &Readings, mut pitch: Pitch) -> Measurement {
-        let Coefficients { c1, c2, c3, c4, c5, determinant } = self.laws;
-        let radius = self.odometry.wheel_radius_m;
         let mut readings = *readings;
-        let steps = (way_s / TICK_S).round() as u32;
-        for step in 0..steps {
-            let left_s = way_s - f64::from(step) * TICK_S;
-            let [left, right] = self.acting(now, left_s, &readings.motor_speed_rad_s);
-            let torque = left + right;
-            let x_ddot = ((c2 + c3) * torque - c2 * c4 * pitch.rad) / determinant;
-            let pitch_accel = (c1 * c4 * pitch.rad - (c1 + c5) * torque) / determinant;
-            let motor_accel = x_ddot / radius - pitch_accel;
+        for step in 0..(way_s / TICK_S).round() as u32 {
+            let asked_nm = self.acting(now, way_s - f64::from(step) * TICK_S);
+            let [left, right] = readings.motor_speed_rad_s;
+            let mean = f64::midpoint(left, right);
+            let next = self.motion(pitch.rad, mean, asked_nm, [left, right], TICK_S);
+            let change = next.speed_rad_s - mean;
             for (angle, speed) in readings.motor_angle_rad.iter_mut().zip(&mut readings.motor_speed_rad_s) {
-                *angle += TICK_S * (*speed + 0.5 * TICK_S * motor_accel);
-                *speed += TICK_S * motor_accel;
+                *angle += TICK_S * (*speed + 0.5 * change);
+                *speed += change;
             }
-            pitch.rad += TICK_S * (pitch.rate_rad_s + 0.5 * TICK_S * pitch_accel);
-            pitch.rate_rad_s += TICK_S * pitch_accel;
+            pitch.rad += TICK_S * (pitch.rate_rad_s + 0.5 * TICK_S * next.pitch_accel_rad_s2);
+            pitch.rate_rad_s += TICK_S * next.pitch_accel_rad_s2;
         }
         (readings.pitch_rad, readings.pitch_rate_rad_s) = (pitch.rad, pitch.rate_rad_s);
         self.held(&readings)
     }
 
-    /// Torques on the shafts `left_s` before one that is asked for `now` acts, less friction, N m.
-    fn acting(&self, now: Duration, left_s: f64, speeds: &[f64; 2]) -> [f64; 2] {
+    /// Mean motor speed after `dt_s` and the pitch's acceleration until then, from pitch, mean speed, torques and the
+    /// speed of each motor.
+    fn motion(&self, pitch_rad: f64, mean: f64, asked_nm: [f64; 2], speeds: [f64; 2], dt_s: f64) -> Motion {
+        let Coefficients { c1, c2, c3, c4, c5, determinant } = self.laws;
+        let radius = self.odometry.wheel_radius_m;
+        let x_ddot = |torque: f64| ((c2 + c3) * torque - c2 * c4 * pitch_rad) / determinant;
+        let pitch_accel = |torque: f64| (c1 * c4 * pitch_rad - (c1 + c5) * torque) / determinant;
+        let asked = asked_nm[0] + asked_nm[1];
+        let free = mean + dt_s * (x_ddot(asked) / radius - pitch_accel(asked));
+        let speed_per_nm = dt_s * ((c2 + c3) / radius + c1 + c5) / determinant;
+        let friction = self.friction_nm(speeds, free / speed_per_nm);
+        Motion {
+            speed_rad_s: free - speed_per_nm * friction,
+            pitch_accel_rad_s2: pitch_accel(asked - friction),
+        }
+    }
+
+    /// Friction of both motors, N m: at most the torque that stops them within the step.
+    fn friction_nm(&self, speeds: [f64; 2], stopping_nm: f64) -> f64 {
+        let of_motor = |motor: usize, speed: f64| {
+            self.friction[motor].map_or([0.0; 2], |curve| {
+                let p = curve.parameters();
+                let smooth = p.offset_nm + p.viscous_nm_s_rad * speed;
+                [curve.level_nm(speed), smooth]
+            })
+        };
+        let [left, right] = speeds;
+        let turning = left * right < 0.0 && left.abs().min(right.abs()) > TURNING_RAD_S;
+        let [of_left, of_right] = [of_motor(0, left), of_motor(1, right)];
+        let smooth = of_left[1] + of_right[1];
+        if turning {
+            return smooth + left.signum() * of_left[0] + right.signum() * of_right[0];
+        }
+        let most = of_left[0] + of_right[0];
+        if most == 0.0 {
+            return smooth;
+        }
+        (stopping_nm - smooth).clamp(-most, most) + smooth
+    }
+
+    /// Torques that act `left_s` before one that is asked for `now` does, N m.
+    fn acting(&self, now: Duration, left_s: f64) -> [f64; 2] {
         // Half a tick of room for ticks that come a little early or late.
         let before = now.saturating_sub(Duration::from_secs_f64((left_s - 0.5 * TICK_S).max(0.0)));
         let asked = self.asked.iter().rev().find(|&&(time, _)| time <= before);
-        let torque = asked.map_or([0.0; 2], |&(_, torque)| torque);
-        [0, 1].map(|motor: usize| {
-            torque[motor] - self.friction[motor].map_or(0.0, |friction| friction.torque_nm(speeds[motor]))
-        })
+        asked.map_or([0.0; 2], |&(_, torque)| torque)
+    }
+
+    /// Torques that acted when the motors were read, N m.
+    pub(super) fn acting_when_read(&self, now: Duration) -> [f64; 2] {
+        self.acting(now, self.delay_s)
     }
 }
 

@@ -60,7 +60,7 @@ impl Listener {
             tilt_rad: None,
             temperature_c: None,
         });
-        self.estimator.hear(self.watch.states(), Some(pitch));
+        self.estimator.hear(now, self.watch.states(), Some(pitch));
         let news = motors.iter().any(|event| matches!(event, MotorEvent::State(..))) || !imu.is_empty();
         let soon =
             self.last_sample.is_some_and(|last| now.saturating_sub(last).as_secs_f64() < 0.999 * TICK_S);

@@ -23,6 +23,7 @@ mod program;
 mod sign;
 mod stage;
 mod switching;
+mod torque_scale;
 mod watch;
 
 pub use exchange::{DriveError, DriveEvent, DriveSettings, Inputs, Orders, Output};
@@ -40,6 +41,7 @@ use checks::Checks;
 use estimate::Estimator;
 use program::Program;
 use switching::Switching;
+use torque_scale::TorqueScale;
 use watch::Watch;
 
 /// Time between two queries of the motors' health, and of their state where no torque is asked for.
@@ -65,6 +67,7 @@ pub struct Drive {
     estimator: Estimator,
     program: Program,
     checks: Checks,
+    torque_scale: TorqueScale,
     reference: Reference,
     asked_nm: [f64; 2],
     armed: Duration,
@@ -98,6 +101,7 @@ impl Drive {
             watch: Watch::new(),
             estimator: Estimator::new(robot),
             checks: Checks::new(program.balances()),
+            torque_scale: TorqueScale::new(robot, program.balances()),
             program,
             reference: Reference::default(),
             asked_nm: [0.0; 2],
@@ -121,6 +125,11 @@ impl Drive {
         self.checks.list()
     }
 
+    /// Whether the motors are off and have said so, or were never switched on.
+    pub fn has_ended(&self) -> bool {
+        self.stage == Stage::Listening || matches!(self.stage, Stage::Stopped(_)) && self.switching.is_none()
+    }
+
     /// Largest torque that is asked of a motor, N m.
     pub fn torque_limit_nm(&self) -> f64 {
         self.torque_limit_nm
@@ -130,7 +139,7 @@ impl Drive {
     pub fn step(&mut self, now: Duration, inputs: &Inputs<'_>) -> Output {
         let mut output = Output::default();
         self.watch.hear(inputs);
-        self.estimator.hear(self.watch.states(), self.watch.imu.last);
+        self.estimator.hear(now, self.watch.states(), self.watch.imu.last);
         if let Some(switching) = &mut self.switching {
             switching.hear(inputs.motors);
         }
@@ -178,6 +187,7 @@ impl Drive {
         }
         self.estimator.count_from_here();
         self.program.start();
+        self.torque_scale = TorqueScale::new(&self.robot, self.program.balances());
         self.reference = Reference::default();
         self.asked_nm = [0.0; 2];
         self.armed = now;
@@ -245,6 +255,12 @@ impl Drive {
         if let Some(reason) = problem {
             return self.stop(now, reason, output);
         }
+        let acted_nm = self.estimator.acting_when_read(now);
+        if let Some(factor) = self.torque_scale.step(&readings, acted_nm)
+            && self.settings.torque_scale_check
+        {
+            return self.stop(now, StopReason::TorqueScale { factor }, output);
+        }
         if self.program.is_done(time_s) {
             return self.stop(now, StopReason::Done, output);
         }
@@ -307,8 +323,13 @@ impl Drive {
     }
 
     fn slewed(&self, motor: usize, wanted_nm: f64) -> f64 {
-        let last = self.asked_nm[motor];
-        last + (wanted_nm - last).clamp(-self.slew_nm, self.slew_nm)
+        let change = wanted_nm - self.asked_nm[motor];
+        // A change within the slew is taken as it is, to the last bit.
+        if change.abs() > self.slew_nm {
+            self.asked_nm[motor] + self.slew_nm.copysign(change)
+        } else {
+            wanted_nm
+        }
     }
 
     /// No torque and motors off, in this very step.
@@ -364,3 +385,6 @@ fn torque_limit(robot: &RobotModel) -> Result<f64, DriveError> {
     }
     Ok(limit_nm)
 }
+
+#[cfg(test)]
+mod tests;

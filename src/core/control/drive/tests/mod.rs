@@ -1,0 +1,3 @@
+mod driving;
+mod rig;
+mod stopping;
