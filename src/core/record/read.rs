@@ -51,7 +51,7 @@ pub fn read_log(
     watch: &mut dyn FnMut(ReadProgress) -> ControlFlow<()>,
 ) -> Result<Log, LogError> {
     let mut lines = Lines::new(reader, source);
-    let header = Header::read(&mut lines)?;
+    let header = Header::read(&mut lines, |_| ())?;
     let mut table = Table::new(Plan::new(&header, source, options.map)?, header, options.max_values);
     let mut watched = 0;
     let mut report = |bytes, rows, line| match watch(ReadProgress { bytes, rows }) {

@@ -19,6 +19,14 @@ pub(super) struct Lines<'a, R> {
     grows: bool,
 }
 
+/// A comment or a row.
+pub(super) enum Line<'a> {
+    /// A comment from its `#` to its line end.
+    Comment(&'a [u8]),
+    /// A row, or the header.
+    Row(Row<'a>),
+}
+
 /// One row: its text without the line end, and the line at which it starts.
 pub(super) struct Row<'a> {
     pub(super) text: &'a [u8],
@@ -50,6 +58,15 @@ impl<'a, R: BufRead> Lines<'a, R> {
             }
         }
         Ok(None)
+    }
+
+    /// The next comment or row.
+    pub(super) fn next_line(&mut self) -> Result<Option<Line<'_>>, LogError> {
+        let Some(line) = self.fill()? else { return Ok(None) };
+        if self.holds_comment() {
+            return Ok(Some(Line::Comment(without_line_end(&self.buffer).trim_ascii_start())));
+        }
+        Ok(Some(Line::Row(self.row(line))))
     }
 
     fn row(&self, line: u64) -> Row<'_> {
@@ -147,12 +164,22 @@ pub(super) struct Header {
 }
 
 impl Header {
-    /// Reads up to the header and checks that it is one.
-    pub(super) fn read<R: BufRead>(lines: &mut Lines<R>) -> Result<Self, LogError> {
+    /// Reads up to the header and checks that it is one; `comment` is handed the comments above it.
+    pub(super) fn read<R: BufRead>(
+        lines: &mut Lines<R>,
+        mut comment: impl FnMut(&[u8]),
+    ) -> Result<Self, LogError> {
         let file = lines.file;
-        let Some(row) = lines.next_row()? else {
-            return Err(LogError::Empty { file: file.to_owned() });
-        };
+        loop {
+            match lines.next_line()? {
+                None => return Err(LogError::Empty { file: file.to_owned() }),
+                Some(Line::Comment(text)) => comment(text),
+                Some(Line::Row(row)) => return Self::parse(&row, file),
+            }
+        }
+    }
+
+    fn parse(row: &Row, file: &str) -> Result<Self, LogError> {
         let line = row.line;
         if let Some(found) = not_text(row.text) {
             return Err(LogError::NotText { file: file.to_owned(), line, found });

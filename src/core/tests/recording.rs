@@ -11,6 +11,7 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use flqr_core::device::{Event, EventKind, Recorder, RecorderError};
+use flqr_core::link::jy901::{Kind, Packet};
 use flqr_core::link::{Direction, Frame, FrameId, StampedFrame};
 use flqr_core::record::recording::{About, Row};
 use flqr_core::record::{BenchSample, ColumnMap, Log, LogKind, ReadOptions, Sample, read_log};
@@ -18,8 +19,7 @@ use rand::{Rng, SeedableRng};
 
 /// Frames for each row: a bus at 1 Mbit/s that is full.
 const FRAMES_A_ROW: u32 = 8;
-/// A packet of the IMU with the right sum.
-const PACKET: [u8; 11] = [0x55, 0x53, 0xFD, 0xFF, 1, 0, 0, 0xC0, 0x10, 0x2F, 0xA4];
+const PACKET: Packet = Packet { kind: Kind::Angle, data: [0xFD, 0xFF, 1, 0, 0, 0xC0, 0x10, 0x2F] };
 
 fn about() -> About {
     let start = Duration::from_secs(1_700_000_000);

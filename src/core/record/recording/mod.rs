@@ -11,11 +11,13 @@
 //! Every line is written with its end, so where the program was killed the last line without one is torn and is
 //! left out by whoever reads. Numbers have the fewest digits that read back to the same number.
 
+mod frame_log;
 mod frames;
 mod names;
 mod text;
 
-pub use frames::{IMU_PACKET, imu_packet, push_frame, push_imu_packet};
+pub use frame_log::FrameLog;
+pub use frames::{imu_packet, push_frame, push_imu_packet};
 pub use names::Names;
 pub use text::{
     About, Row, bench_header, parse_event, parse_start, push_bench_row, push_event, push_row, robot_header,

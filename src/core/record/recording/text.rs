@@ -66,8 +66,9 @@ const START: &str = "# time_s counts from ";
 /// Start of a recording since 1970, if this comment of its log says so.
 pub fn parse_start(comment: &str) -> Option<Duration> {
     let (seconds, micros) = comment.strip_prefix(START)?.strip_suffix(" s after 1970")?.split_once('.')?;
-    let micros = (micros.len() == 6).then(|| micros.parse().ok())??;
-    Some(Duration::from_secs(seconds.parse().ok()?) + Duration::from_micros(micros))
+    let micros: u32 = (micros.len() == 6).then(|| micros.parse().ok())??;
+    let seconds: u32 = seconds.parse().ok()?;
+    Some(Duration::new(seconds.into(), 0) + Duration::from_micros(micros.into()))
 }
 
 /// Adds a row to the robot log.

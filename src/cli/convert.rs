@@ -1,0 +1,124 @@
+//! `flqr convert`: recordings for other programs.
+
+use std::ffi::OsStr;
+use std::fs::File;
+use std::io::{self, BufReader, Write};
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use flqr_core::record::mcap::{self, Conversion, ConvertError, Input};
+use flqr_core::record::{ColumnMap, Mapping};
+use serde::Serialize;
+
+use super::output::{Failure, Output};
+use super::progress::Progress;
+use super::{file, input};
+
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// Files of one recording: robot log or bench logs (CSV), raw frames (candump); they are merged by time
+    #[arg(required = true, num_args = 2.., value_names = ["IN", "OUT.mcap"])]
+    files: Vec<PathBuf>,
+    /// A column of ours from one of the file's, as in torque_nm=current_a*0.32; repeatable
+    #[arg(long, value_name = "OURS=THEIRS[*FACTOR]")]
+    map: Vec<Mapping>,
+}
+
+/// Keys of the JSON object.
+#[derive(Serialize)]
+struct Converted<'a> {
+    out: &'a Path,
+    #[serde(flatten)]
+    conversion: &'a Conversion,
+}
+
+pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
+    let (out, files) = arguments.files.split_last().expect("clap asks for two files at least");
+    check_output(out)?;
+    let map = ColumnMap::new(arguments.map.clone()).map_err(Failure::from_error)?;
+    let names: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
+    let mut bytes = 0;
+    let mut inputs = Vec::new();
+    for (path, source) in files.iter().zip(&names) {
+        let (reader, size) = input::open(path)?;
+        bytes += size;
+        inputs.push(Input { source, topic: topic(path), reader });
+    }
+    let conversion = write(out, inputs, &map, bytes)?;
+    output.result(&Converted { out, conversion: &conversion }, |text| print(text, out, &conversion))
+}
+
+/// Refuses what is no MCAP file by its name, most of all the last file of a recording without an output.
+fn check_output(out: &Path) -> Result<(), Failure> {
+    if out.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("mcap")) {
+        return Ok(());
+    }
+    Err(Failure::Message(format!(
+        "{}: the last file is the one that is written, and only MCAP is: end its name in .mcap",
+        out.display()
+    )))
+}
+
+/// Where columns go that are not those of a robot log.
+fn topic(path: &Path) -> &'static str {
+    let side = path.file_stem().and_then(|stem| Path::new(stem).extension()).and_then(OsStr::to_str);
+    match side {
+        Some("left") => "/bench/left",
+        Some("right") => "/bench/right",
+        _ => "/log",
+    }
+}
+
+fn write(
+    out: &Path,
+    inputs: Vec<Input<BufReader<File>>>,
+    map: &ColumnMap,
+    bytes: u64,
+) -> Result<Conversion, Failure> {
+    let bar = Progress::new(format!("writing {}", out.display()));
+    let mut done = None;
+    let written = file::write(out, "MCAP file", |sink| {
+        let converted = mcap::convert(inputs, map, sink, &mut |read| {
+            bar.set(read, bytes);
+            ControlFlow::Continue(())
+        });
+        match converted {
+            Ok(conversion) => done = Some(Ok(conversion)),
+            Err(ConvertError::Write(error)) => return Err(error),
+            Err(error) => {
+                done = Some(Err(Failure::from_error(&error)));
+                return Err(io::Error::other(error));
+            }
+        }
+        Ok(())
+    });
+    match done {
+        Some(Err(failure)) => Err(failure),
+        Some(Ok(conversion)) => written.map(|()| conversion),
+        None => Err(written.err().unwrap_or(Failure::ReaderGone)),
+    }
+}
+
+fn print(text: &mut dyn Write, out: &Path, conversion: &Conversion) -> io::Result<()> {
+    writeln!(text, "{}", out.display())?;
+    for (topic, messages) in &conversion.topics {
+        writeln!(text, "  {topic:24}{messages:>12} messages")?;
+    }
+    if conversion.dropped > 0 {
+        writeln!(text, "{} damaged rows and frames were left out:", conversion.dropped)?;
+    }
+    conversion.problems.iter().try_for_each(|problem| writeln!(text, "  {problem}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bench_logs_of_a_recording_have_topics_of_their_own() {
+        let names = ["a/run.left.csv", "run.right.csv", "run.csv", "left.csv", "run.2.csv"];
+        let topics = names.map(|name| topic(Path::new(name)));
+        assert_eq!(topics, ["/bench/left", "/bench/right", "/log", "/log", "/log"]);
+    }
+}

@@ -1,0 +1,200 @@
+//! Reading raw frames of any length, one by one.
+
+use std::io::{BufRead, Read};
+
+use super::frames::parse_line as parse;
+use crate::link::StampedFrame;
+use crate::record::{LineProblem, LogError};
+
+/// A line longer than this is damage, not a frame.
+const LINE_LIMIT_BYTES: usize = 1 << 10;
+
+/// Reads a candump file frame by frame. A line that is no classic frame is left out and counted, and so is a last
+/// line without an end: it was cut.
+pub struct FrameLog<'a, R> {
+    reader: R,
+    source: &'a str,
+    line: Vec<u8>,
+    number: u64,
+    bytes: u64,
+    frames: u64,
+    damaged: u64,
+    first_problem: Option<LineProblem>,
+}
+
+impl<'a, R: BufRead> FrameLog<'a, R> {
+    /// A reader of this text; `source` is its name in messages.
+    pub fn new(reader: R, source: &'a str) -> Self {
+        Self {
+            reader,
+            source,
+            line: Vec::new(),
+            number: 0,
+            bytes: 0,
+            frames: 0,
+            damaged: 0,
+            first_problem: None,
+        }
+    }
+
+    /// Bytes read so far.
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    /// Lines that were left out so far.
+    pub fn damaged(&self) -> u64 {
+        self.damaged
+    }
+
+    /// The first of them.
+    pub fn first_problem(&self) -> Option<&LineProblem> {
+        self.first_problem.as_ref()
+    }
+
+    /// The next frame and its interface; times count from 1970.
+    ///
+    /// # Errors
+    /// [`LogError::Io`], and [`LogError::MostlyBad`] at the end of a file without a single frame.
+    pub fn next_frame(&mut self) -> Result<Option<(&str, StampedFrame)>, LogError> {
+        let found = loop {
+            if !self.next_line()? {
+                return self.end().map(|()| None);
+            }
+            match parse(&self.line) {
+                Ok(found) => break found,
+                Err(problem) => self.complain(problem),
+            }
+        };
+        self.frames += 1;
+        let (interface, frame) = found;
+        Ok(Some((std::str::from_utf8(&self.line[interface]).unwrap_or("?"), frame)))
+    }
+
+    /// Reads the next line that is not blank and has an end.
+    fn next_line(&mut self) -> Result<bool, LogError> {
+        let mut too_long = false;
+        loop {
+            self.line.clear();
+            let count = self.read_piece()?;
+            self.bytes += count as u64;
+            let ended = self.line.ends_with(b"\n");
+            self.number += u64::from(ended || (count > 0 && count < LINE_LIMIT_BYTES));
+            match (count, ended) {
+                (0, _) => return Ok(false),
+                (_, true) if too_long => {
+                    self.complain("the line is too long for a frame, it was left out".to_owned())
+                }
+                (_, true) if self.line.trim_ascii().is_empty() => {}
+                (_, true) => return Ok(true),
+                (LINE_LIMIT_BYTES, false) => {}
+                _ => self.complain("the recording was cut off in this line, it was left out".to_owned()),
+            }
+            too_long = !ended;
+        }
+    }
+
+    fn read_piece(&mut self) -> Result<usize, LogError> {
+        let piece = self.reader.by_ref().take(LINE_LIMIT_BYTES as u64).read_until(b'\n', &mut self.line);
+        piece.map_err(|error| LogError::Io {
+            file: self.source.to_owned(),
+            line: self.number,
+            problem: error.to_string(),
+        })
+    }
+
+    fn complain(&mut self, problem: String) {
+        self.damaged += 1;
+        let (line, column) = (self.number, String::new());
+        self.first_problem.get_or_insert(LineProblem { line, column, problem });
+    }
+
+    /// Whether there was a frame at all.
+    fn end(&self) -> Result<(), LogError> {
+        match &self.first_problem {
+            Some(first) if self.frames == 0 => Err(LogError::MostlyBad {
+                file: self.source.to_owned(),
+                bad: self.damaged as usize,
+                rows: self.damaged as usize,
+                first: first.clone(),
+            }),
+            _ => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+    use crate::link::{Direction, Frame, FrameId};
+
+    fn read(text: &[u8]) -> (Vec<(String, StampedFrame)>, u64, Option<String>) {
+        let mut log = FrameLog::new(text, "run.log");
+        let mut frames = Vec::new();
+        while let Some((interface, frame)) = log.next_frame().unwrap() {
+            frames.push((interface.to_owned(), frame));
+        }
+        (frames, log.damaged(), log.first_problem().map(ToString::to_string))
+    }
+
+    fn text() -> String {
+        let mut text = String::new();
+        for frame in frames() {
+            super::super::push_frame(&mut text, Duration::from_secs(1_700_000_000), "can0", &frame);
+        }
+        text
+    }
+
+    fn frames() -> Vec<StampedFrame> {
+        let standard = FrameId::standard(0x141).unwrap();
+        let frames = [
+            Frame::full(standard, [0xA1, 0, 0, 0, 0x84, 1, 0, 0]),
+            Frame::data(FrameId::extended(0x12AB_CDEF).unwrap(), &[0xAA]).unwrap(),
+            Frame::remote(standard, 8).unwrap(),
+            Frame::error(4, [0, 12, 0, 0, 0, 0, 0, 0]).unwrap(),
+            Frame::data(standard, &[]).unwrap(),
+        ];
+        let stamped = |(index, frame): (u64, Frame)| {
+            let direction = if index.is_multiple_of(2) { Direction::Sent } else { Direction::Received };
+            StampedFrame { time: Duration::from_micros(index * 125), direction, frame }
+        };
+        (0..).zip(frames).map(stamped).collect()
+    }
+
+    #[test]
+    fn written_frames_read_back() {
+        let start = Duration::from_secs(1_700_000_000);
+        let expected = frames()
+            .into_iter()
+            .map(|frame| ("can0".to_owned(), StampedFrame { time: start + frame.time, ..frame }));
+        assert_eq!(read(text().as_bytes()), (expected.collect(), 0, None));
+    }
+
+    #[test]
+    fn a_file_cut_anywhere_loses_its_torn_line_only() {
+        let (text, all) = (text(), read(text().as_bytes()).0);
+        for end in 1..text.len() {
+            let lines = text[..end].matches('\n').count();
+            if lines == 0 {
+                assert!(FrameLog::new(&text.as_bytes()[..end], "run.log").next_frame().is_err());
+                continue;
+            }
+            let (frames, damaged, _) = read(&text.as_bytes()[..end]);
+            assert_eq!(
+                (frames.as_slice(), damaged),
+                (&all[..lines], u64::from(!text[..end].ends_with('\n')))
+            );
+        }
+    }
+
+    #[test]
+    fn damaged_lines_are_counted_and_the_first_is_named() {
+        let long = "x".repeat(3 * LINE_LIMIT_BYTES);
+        let text = text().replacen('\n', &format!("\n\n(1.5 can0 nonsense\n{long}\n"), 1) + "(17";
+        let (frames, damaged, first) = read(text.as_bytes());
+        assert_eq!((frames.len(), damaged), (5, 3));
+        assert!(first.as_ref().unwrap().starts_with("line 3: "), "{first:?}");
+    }
+}
