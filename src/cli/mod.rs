@@ -1,15 +1,22 @@
 //! The command line: one file for each command, all over the same core functions as the window.
 
+mod convert;
+mod drive;
 mod export;
 mod file;
 mod fit;
 mod gains;
 mod input;
+mod interfaces;
+mod interrupt;
+mod monitor;
 mod output;
 mod progress;
 mod reproduce;
 mod riccati;
+mod robot_lines;
 mod simulate;
+mod timing;
 mod window;
 
 use std::process::ExitCode;
@@ -45,8 +52,18 @@ enum Command {
     Simulate(simulate::Arguments),
     /// Every experiment of the paper on the simulated robot, ours beside theirs
     Reproduce(reproduce::Arguments),
+    /// Write a recording as an MCAP file, which Foxglove, PlotJuggler and Rerun open
+    Convert(convert::Arguments),
     /// Write what a robot's firmware or a script takes over
     Export(export::Arguments),
+    /// Watch a robot, without sending a single frame
+    Monitor(monitor::Arguments),
+    /// Control a robot, armed in two steps and limited
+    Drive(drive::Arguments),
+    /// CAN interfaces and serial ports, and the commands that make one
+    Interfaces,
+    /// How late the control loop's ticks come, beside a bare timer loop on this machine
+    Timing(timing::Arguments),
 }
 
 /// Runs the command and maps its outcome to an exit code: 0 done, 1 could not be done.
@@ -63,7 +80,12 @@ pub(crate) fn run(cli: Cli) -> ExitCode {
         Some(Command::Fit(arguments)) => fit::run(&arguments, &output),
         Some(Command::Simulate(arguments)) => simulate::run(&arguments, &output),
         Some(Command::Reproduce(arguments)) => reproduce::run(&arguments, &output),
+        Some(Command::Convert(arguments)) => convert::run(&arguments, &output),
         Some(Command::Export(arguments)) => export::run(&arguments, &output),
+        Some(Command::Monitor(arguments)) => monitor::run(&arguments, &output),
+        Some(Command::Drive(arguments)) => drive::run(&arguments, &output),
+        Some(Command::Interfaces) => interfaces::run(&output),
+        Some(Command::Timing(arguments)) => timing::run(&arguments, &output),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

@@ -40,7 +40,7 @@ impl Output {
         Self { json }
     }
 
-    /// Prints the result: `value` with `--json`, else what `text` writes.
+    /// Prints a result, or one of many: `value` on a line of its own with `--json`, else what `text` writes.
     pub(crate) fn result<T: Serialize>(
         &self,
         value: &T,
@@ -54,6 +54,13 @@ impl Output {
             text(&mut out)?;
         }
         Ok(out.flush()?)
+    }
+}
+
+impl Output {
+    /// Whether standard output is for scripts.
+    pub(crate) fn is_json(&self) -> bool {
+        self.json
     }
 }
 

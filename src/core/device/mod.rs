@@ -1,10 +1,37 @@
 //! The one room with effects: sockets, serial ports, files of a recording, threads and clocks.
+#![expect(clippy::disallowed_methods, reason = "the one room of the core that meets the system")]
 
+mod bus_health;
+#[cfg(target_os = "linux")]
+mod can;
+mod clock;
+mod imu_port;
+mod interfaces;
+mod lateness;
+mod open;
+mod open_error;
+mod pacer;
+mod reconnect;
 mod recorder;
+mod serial;
 mod session;
+mod slcan;
+mod timing;
 
+pub use bus_health::{BusHealth, BusState};
+#[cfg(target_os = "linux")]
+pub use can::SocketCan;
+pub use clock::Clock;
+pub use imu_port::{ImuPort, open_imu};
+pub use interfaces::{Advice, CanInterface, Interfaces, SerialPort, interfaces};
+pub use lateness::Lateness;
+pub use open::{BusPair, open_bus};
+pub use open_error::OpenError;
+pub use pacer::{Pacer, Priority, Tick, hurry};
 pub use recorder::{Recorder, RecorderError, RecorderInput};
 pub use session::{
     Connection, Counters, DriveStatus, Event, EventKind, ImuStatus, MotorStatus, RecordingStatus,
-    SerialAddress, SessionMode, SessionOptions, SessionOrder, Source, SourceError, Status, Timing, Update,
+    SerialAddress, SerialAddressError, Session, SessionError, SessionMode, SessionOptions, SessionOrder,
+    Source, SourceError, Status, Timing, Update, Waker,
 };
+pub use timing::{LatenessSummary, TimingComparison, TimingPlan, compare_timing};

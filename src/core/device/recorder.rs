@@ -1,7 +1,5 @@
 //! A thread that writes a recording while the robot runs, and never holds up who hands it something.
 
-#![expect(clippy::disallowed_methods, reason = "this room writes files and starts threads")]
-
 use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -13,8 +11,9 @@ use std::time::Duration;
 
 use super::session::{Event, EventKind, RecordingStatus};
 use crate::link::StampedFrame;
+use crate::link::jy901::Packet;
 use crate::record::BenchSample;
-use crate::record::recording::{self, About, IMU_PACKET, Names, Row};
+use crate::record::recording::{self, About, Names, Row};
 use crate::robot::Motor;
 
 /// What is handed over reaches the system within this time, unless the machine is too busy.
@@ -79,7 +78,7 @@ enum Item {
     Row(Row),
     Bench(BenchSample),
     Frame(StampedFrame),
-    ImuPacket(Duration, [u8; IMU_PACKET]),
+    ImuPacket(Duration, Packet),
     Event(Duration, String),
 }
 
@@ -161,7 +160,7 @@ impl RecorderInput {
     }
 
     /// An intact packet of the IMU and when it was heard, since the start of the session.
-    pub fn imu_packet(&self, time: Duration, packet: &[u8; IMU_PACKET]) {
+    pub fn imu_packet(&self, time: Duration, packet: &Packet) {
         self.hand_over(Item::ImuPacket(time, *packet));
     }
 

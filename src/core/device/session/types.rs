@@ -11,6 +11,9 @@ use crate::link::{MotorHealth, StampedFrame};
 use crate::model_file::RobotModel;
 use crate::record::Sample;
 
+/// Bit rate of an LK motor's bus as delivered, bit/s.
+const DEFAULT_BIT_RATE: u32 = 1_000_000;
+
 /// Where the frames come from.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Source {
@@ -52,8 +55,10 @@ impl FromStr for Source {
             None if text == "emulated" => Ok(Self::Emulated),
             Some(("can", interface)) => Ok(Self::Can { interface: given(interface)? }),
             Some(("slcan", rest)) => {
-                let (port, rate) = rest.rsplit_once('@').unwrap_or((rest, "1000000"));
-                let bit_rate = rate.parse().map_err(|_| error())?;
+                let (port, bit_rate) = match rest.rsplit_once('@') {
+                    Some((port, rate)) => (port, rate.parse().map_err(|_| error())?),
+                    None => (rest, DEFAULT_BIT_RATE),
+                };
                 Ok(Self::Slcan { port: given(port)?, bit_rate })
             }
             Some(("replay", file)) => Ok(Self::Replay { file: given(file)?.into() }),
@@ -73,6 +78,26 @@ impl fmt::Display for Source {
     }
 }
 
+impl Source {
+    /// Name of the interface in recordings of raw frames.
+    pub(super) fn interface(&self) -> String {
+        match self {
+            Self::Can { interface } => interface.clone(),
+            Self::Slcan { .. } => "slcan0".to_owned(),
+            Self::Emulated | Self::Replay { .. } => "can0".to_owned(),
+        }
+    }
+
+    /// Bit rate of the bus, bit/s, where it is known.
+    pub(super) fn bit_rate(&self) -> Option<u32> {
+        match self {
+            Self::Slcan { bit_rate, .. } => Some(*bit_rate),
+            Self::Emulated => Some(DEFAULT_BIT_RATE),
+            Self::Can { .. } | Self::Replay { .. } => None,
+        }
+    }
+}
+
 /// A serial port and its speed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SerialAddress {
@@ -80,6 +105,31 @@ pub struct SerialAddress {
     pub port: String,
     /// Speed, bit/s.
     pub baud: u32,
+}
+
+/// A serial port that cannot be read from its name.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("no serial port is written `{text}`: give serial:PORT@BAUD, as in serial:/dev/ttyUSB0@115200")]
+pub struct SerialAddressError {
+    text: String,
+}
+
+impl FromStr for SerialAddress {
+    type Err = SerialAddressError;
+
+    fn from_str(text: &str) -> Result<Self, SerialAddressError> {
+        let error = || SerialAddressError { text: text.to_owned() };
+        let (port, baud) =
+            text.strip_prefix("serial:").and_then(|rest| rest.rsplit_once('@')).ok_or_else(error)?;
+        let baud = baud.parse().ok().filter(|baud| *baud > 0).ok_or_else(error)?;
+        if port.is_empty() { Err(error()) } else { Ok(Self { port: port.to_owned(), baud }) }
+    }
+}
+
+impl fmt::Display for SerialAddress {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "serial:{}@{}", self.port, self.baud)
+    }
 }
 
 /// Whether anything may ever be sent.
@@ -94,6 +144,18 @@ pub enum SessionMode {
         /// What the motors are to do.
         excitation: Excitation,
     },
+}
+
+impl SessionMode {
+    /// Whether the wheels are to be off the ground.
+    pub(super) fn wheels_in_air(&self) -> bool {
+        match self {
+            Self::Listen => false,
+            Self::Drive { excitation, .. } => {
+                matches!(excitation, Excitation::SpeedSweep { .. } | Excitation::Multisine { .. })
+            }
+        }
+    }
 }
 
 /// What a session is opened with.
@@ -319,4 +381,27 @@ pub struct RecordingStatus {
     pub bytes: u64,
     /// Why it has ended early: disk full, for instance.
     pub problem: Option<String>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sources_and_ports_are_read_as_they_are_written_and_nothing_else_is() {
+        for text in ["can:can0", "slcan:/dev/ttyACM0@500000", "emulated", "replay:run:1.log"] {
+            assert_eq!(text.parse::<Source>().map(|source| source.to_string()).as_deref(), Ok(text));
+        }
+        let without_rate = Source::Slcan { port: "COM3".to_owned(), bit_rate: 1_000_000 };
+        assert_eq!("slcan:COM3".parse(), Ok(without_rate));
+        for text in ["", "can", "can:", "can0", "slcan:", "slcan:@5", "slcan:p@fast", "Emulated", "replay:"] {
+            assert!(text.parse::<Source>().is_err(), "{text}");
+        }
+        let port = "serial:/dev/ttyUSB0@115200";
+        assert_eq!(port.parse::<SerialAddress>().map(|port| port.to_string()).as_deref(), Ok(port));
+        for text in ["/dev/ttyUSB0@115200", "serial:/dev/ttyUSB0", "serial:@9600", "serial:p@0", "serial:p@x"]
+        {
+            assert!(text.parse::<SerialAddress>().is_err(), "{text}");
+        }
+    }
 }

@@ -1,0 +1,70 @@
+#!/bin/sh
+# Inside the virtual machine of .ci/vcan.sh: the program on real SocketCAN, with can-utils as a third party.
+# Clocks are not steady in there, so nothing here depends on timing.
+set -eu
+model=/model.toml
+step() { echo "== $*"; }
+fail() { echo "FAILED: $*"; exit 1; }
+# The last status line that a session printed.
+last() { grep '"type":"status"' "$1" | tail -n 1; }
+
+step "frames both ways, states, and every dropped frame counted"
+FLQR_REQUIRE_CAN=1 socketcan --test-threads=1
+
+step "interfaces are listed"
+flqr interfaces --json | jq -e '.can | map(.name) | (index("vcan0") != null and index("vcan1") != null)' >/dev/null ||
+    fail "flqr interfaces"
+
+step "emulator and monitor as two processes, candump as a third party"
+flqr emulate $model --can vcan0 --balancing --json --seconds 14 > emulate.json &
+emulator=$!
+sleep 1
+candump -L -n 400 -T 8000 vcan0 > dump.log &
+dump=$!
+flqr monitor can:vcan0 --model $model --seconds 5 --record watched.csv --json > monitor.jsonl
+wait $dump
+last monitor.jsonl | jq -e '.connection == "connected" and .motors.left.rate_hz > 50 and .bus.sent == 0' >/dev/null ||
+    { last monitor.jsonl; fail "the monitor hears the emulated robot and sends nothing"; }
+grep -q ' 141#A1' dump.log || fail "candump sees torque commands"
+[ "$(grep -c ' vcan0 ' watched.log)" -gt 500 ] || fail "the recording has the raw frames"
+candump -L -n 1 -T 3000 vcan0,181:7FF,141:7FF > reply.log &
+dump=$!
+sleep 0.3
+cansend vcan0 142#9A00000000000000
+wait $dump
+wait $emulator
+
+step "driven over CAN"
+flqr emulate $model --can vcan0 --json --seconds 40 > emulate.json &
+emulator=$!
+sleep 1
+imu=$(head -n 1 emulate.json | jq -r .imu)
+flqr drive can:vcan0 $model --imu "serial:$imu@115200" --arm --yes --seconds 2 --record driven.csv --json > drive.jsonl ||
+    echo "drive ended with $?"
+grep '"type":"event"' drive.jsonl || true
+tail -n 1 drive.jsonl
+grep -q '"stage":"driving"' drive.jsonl || fail "the robot was driven"
+grep -q ' 141#8000000000000000' driven.log || fail "the motors were switched off in the end"
+kill $emulator
+wait $emulator || true
+
+step "slcand on the emulator's pseudo-terminal"
+flqr emulate $model --balancing --json --seconds 12 > emulate.json &
+emulator=$!
+sleep 1
+slcan=$(head -n 1 emulate.json | jq -r .slcan)
+slcand -o -c -s8 "$slcan" slcan0
+sleep 0.5
+ip link set slcan0 up
+candump -L -n 100 -T 5000 slcan0 > slcan.log
+[ "$(grep -c ' slcan0 14[12]#A1' slcan.log)" -gt 50 ] || { head slcan.log; fail "slcand hears the emulated adapter"; }
+flqr monitor can:slcan0 --model $model --seconds 3 --json > monitor.jsonl
+last monitor.jsonl | jq -e '.motors.left.rate_hz > 20' >/dev/null || { last monitor.jsonl; fail "the monitor hears it too"; }
+kill $emulator
+wait $emulator || true
+
+step "an interface that is not there"
+flqr monitor can:can7 --seconds 1 2> refused.txt && fail "can7 was opened" || true
+cat refused.txt
+grep -q can7 refused.txt || fail "the refusal names the interface"
+step done

@@ -1,0 +1,25 @@
+//! Ctrl+C, or the end that the system asks for: the robot has to be switched off before the program ends.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use super::output::Failure;
+
+/// Whether the program is to end.
+pub(super) struct Interrupt(Arc<AtomicBool>);
+
+impl Interrupt {
+    /// From now on an interrupt is noted and no longer ends the program.
+    pub(super) fn watch() -> Result<Self, Failure> {
+        let flag = Arc::new(AtomicBool::new(false));
+        let raised = Arc::clone(&flag);
+        ctrlc::set_handler(move || raised.store(true, Ordering::Relaxed))
+            .map_err(|error| Failure::Message(format!("cannot watch for Ctrl+C: {error}")))?;
+        Ok(Self(flag))
+    }
+
+    /// Whether it came.
+    pub(super) fn came(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
+}

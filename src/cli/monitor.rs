@@ -1,0 +1,90 @@
+//! `flqr monitor`: watch a robot, without sending a single frame.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Duration;
+
+use clap::Args;
+use flqr_core::device::{Connection, SerialAddress, Session, SessionMode, SessionOptions, Source};
+use flqr_core::model_file::presets;
+
+use super::input;
+use super::interrupt::Interrupt;
+use super::output::{Failure, Output};
+use super::robot_lines::Lines;
+
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// Where the frames come from: can:INTERFACE, slcan:PORT@BITRATE, emulated, replay:FILE
+    source: Source,
+    #[command(flatten)]
+    wire: Wire,
+    /// Model of the robot, for its [link] settings [default: the paper's robot]
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
+    /// End after so many seconds [default: at Ctrl+C, or with the recording]
+    #[arg(long, value_parser = seconds)]
+    seconds: Option<f64>,
+    /// Speed of a replay; 0 is as fast as possible
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = speed)]
+    speed: f64,
+    /// Seed of an emulated robot's noise
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+}
+
+/// What `monitor` and `drive` have in common.
+#[derive(Args)]
+pub(super) struct Wire {
+    /// Serial port of the IMU, as in serial:/dev/ttyUSB0@115200
+    #[arg(long, value_name = "serial:DEV@BAUD")]
+    pub(super) imu: Option<SerialAddress>,
+    /// Record the robot log to this file, and the raw frames to one of the same name that ends in .log
+    #[arg(long, value_name = "OUT.csv")]
+    pub(super) record: Option<PathBuf>,
+}
+
+pub(super) fn seconds(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(seconds) if (0.0..=1e6).contains(&seconds) => Ok(seconds),
+        _ => Err("it must be a number of seconds from 0 to 1000000".to_owned()),
+    }
+}
+
+fn speed(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(0.0) => Ok(f64::INFINITY),
+        Ok(speed) if (0.01..=1000.0).contains(&speed) => Ok(speed),
+        _ => Err("it must be a number from 0.01 to 1000, or 0".to_owned()),
+    }
+}
+
+pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
+    let robot = match &arguments.model {
+        Some(path) => input::load_robot(path)?.1,
+        None => presets::paper().robot().cloned().expect("the paper's preset is a robot"),
+    };
+    let options = SessionOptions {
+        source: arguments.source.clone(),
+        imu: arguments.wire.imu.clone(),
+        robot,
+        mode: SessionMode::Listen,
+        record: arguments.wire.record.clone(),
+        seed: arguments.seed,
+        replay_speed: arguments.speed,
+    };
+    let interrupt = Interrupt::watch()?;
+    let mut session = Session::open(options, Arc::new(|| {})).map_err(Failure::from_error)?;
+    let mut lines = Lines::new(output);
+    let mut time = Duration::ZERO;
+    let end = arguments.seconds.map_or(Duration::MAX, Duration::from_secs_f64);
+    while !interrupt.came() && time < end {
+        let Some(update) = session.wait(Duration::from_millis(100)) else { continue };
+        time = update.status.time;
+        lines.update(&update)?;
+        if update.status.connection == Connection::Ended {
+            break;
+        }
+    }
+    lines.end(time, None)
+}

@@ -1,0 +1,99 @@
+//! `flqr timing`: how late the control loop's ticks come, beside a bare timer loop on the same machine.
+
+use std::io::{self, Write};
+use std::ops::ControlFlow;
+use std::time::Duration;
+
+use clap::Args;
+use clap::builder::RangedU64ValueParser;
+use flqr_core::control::{BalanceController, ControllerKind};
+use flqr_core::device::{LatenessSummary, Priority, TimingComparison, TimingPlan, compare_timing};
+use flqr_core::lqr::{self, Weights};
+use flqr_core::model_file::presets;
+use flqr_core::simulate::{Simulation, SimulationSettings};
+use serde::Serialize;
+
+use super::output::{self, Failure, Output};
+use super::progress::Progress;
+
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// Length of each run, s
+    #[arg(long, default_value_t = 10, value_parser = RangedU64ValueParser::<u64>::new().range(1..=3600))]
+    seconds: u64,
+    /// Runs of each loop; they alternate
+    #[arg(long, default_value_t = 5, value_parser = RangedU64ValueParser::<u64>::new().range(1..=1000))]
+    runs: u64,
+}
+
+/// Keys of the JSON object; lateness in s.
+#[derive(Serialize)]
+struct Report {
+    bare: LatenessSummary,
+    control: LatenessSummary,
+    p99_ratio: f64,
+    real_time_priority: bool,
+}
+
+pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
+    let plan = TimingPlan {
+        period: Duration::from_millis(1),
+        run: Duration::from_secs(arguments.seconds),
+        runs: arguments.runs as usize,
+    };
+    let mut tick = control_tick()?;
+    let progress = Progress::new("timing");
+    let comparison = compare_timing(plan, |_| tick(), &mut |done| {
+        progress.set(done as u64, arguments.runs);
+        ControlFlow::Continue(())
+    });
+    drop(progress);
+    if let Priority::Usual(reason) = &comparison.priority {
+        output::complain(&format!("warning: {reason}"));
+    }
+    let report = Report::of(&comparison);
+    output.result(&report, |out| print(out, &report, plan))
+}
+
+/// A tick with the work of a control loop: sensors, controller and the paper's robot under it.
+fn control_tick() -> Result<impl FnMut() + Send, Failure> {
+    let model = presets::paper();
+    let robot = model.robot().expect("the paper's preset is a robot").clone();
+    let weights: Weights = robot.weights.expect("a test finds weights in every preset");
+    let design = lqr::design(&robot.parameters.linear_model(), &weights).map_err(Failure::from_error)?;
+    let controller = BalanceController::new(ControllerKind::Flqr, &robot, design.gain);
+    let controller = controller.map_err(Failure::from_error)?;
+    let simulation = Simulation::new(&robot, controller, SimulationSettings::default());
+    let mut simulation = simulation.map_err(Failure::from_error)?;
+    Ok(move || {
+        std::hint::black_box(simulation.step());
+    })
+}
+
+impl Report {
+    fn of(comparison: &TimingComparison) -> Self {
+        Self {
+            bare: LatenessSummary::of(&comparison.bare),
+            control: LatenessSummary::of(&comparison.control),
+            p99_ratio: comparison.p99_ratio(),
+            real_time_priority: comparison.priority == Priority::RealTime,
+        }
+    }
+}
+
+fn print(out: &mut dyn Write, report: &Report, plan: TimingPlan) -> io::Result<()> {
+    let priority = if report.real_time_priority { "real-time" } else { "usual" };
+    writeln!(
+        out,
+        "lateness of ticks at 1000 Hz, {} alternated runs of {} s each, {priority} priority; µs\n",
+        plan.runs,
+        plan.run.as_secs()
+    )?;
+    writeln!(out, "{:14}{:>10}{:>10}{:>10}{:>10}{:>10}", "", "p50", "p99", "max", "ticks", "skipped")?;
+    for (name, summary) in [("bare timer", report.bare), ("control loop", report.control)] {
+        let LatenessSummary { p50_s, p99_s, max_s, ticks, skipped } = summary;
+        let [p50, p99, max] = [p50_s, p99_s, max_s].map(|seconds| 1e6 * seconds);
+        writeln!(out, "{name:14}{p50:>10.1}{p99:>10.1}{max:>10.1}{ticks:>10}{skipped:>10}")?;
+    }
+    writeln!(out, "\nratio of p99, median of the runs: {:.3}", report.p99_ratio)
+}

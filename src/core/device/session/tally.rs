@@ -1,0 +1,154 @@
+//! Counts, rates and newest readings for the status.
+
+use std::time::Duration;
+
+use super::rate::Rate;
+use super::types::{Counters, ImuStatus, MotorStatus};
+use crate::link::{Direction, FrameKind, ImuReading, MotorEvent, StampedFrame, bus_load};
+use crate::record::Sample;
+use crate::record::recording::Row;
+use crate::robot::Motor;
+
+/// Everything that is counted.
+#[derive(Default)]
+pub(super) struct Tally {
+    /// Bit rate of the bus, bit/s, where it is known.
+    bit_rate: Option<u32>,
+    received: Rate,
+    bits: Rate,
+    counters: Counters,
+    motors: [MotorTally; 2],
+    imu: ImuTally,
+}
+
+#[derive(Default)]
+struct MotorTally {
+    status: MotorStatus,
+    rate: Rate,
+    heard: Option<Duration>,
+    asked: u64,
+    answered: u64,
+}
+
+#[derive(Default)]
+struct ImuTally {
+    status: ImuStatus,
+    rate: Rate,
+    heard: Option<Duration>,
+}
+
+impl Tally {
+    pub(super) fn new(bit_rate: Option<u32>) -> Self {
+        Self { bit_rate, ..Self::default() }
+    }
+
+    /// A frame that was received or sent.
+    pub(super) fn frame(&mut self, stamped: &StampedFrame) {
+        let StampedFrame { time, direction, frame } = stamped;
+        if frame.kind() == FrameKind::Error {
+            return;
+        }
+        self.bits.add(*time, f64::from(bus_load::bits(frame)));
+        match direction {
+            Direction::Received => {
+                self.counters.received += 1;
+                self.received.add(*time, 1.0);
+            }
+            Direction::Sent => self.counters.sent += 1,
+        }
+    }
+
+    /// A torque that was asked of both motors, each of which answers.
+    pub(super) fn asked(&mut self) {
+        self.motors.iter_mut().for_each(|motor| motor.asked += 1);
+    }
+
+    pub(super) fn motor(&mut self, event: &MotorEvent) {
+        match event {
+            MotorEvent::State(motor, state) => {
+                let tally = &mut self.motors[*motor as usize];
+                tally.heard = Some(state.time);
+                tally.rate.add(state.time, 1.0);
+                tally.answered += 1;
+                tally.status.temperature_c = Some(state.temperature_c);
+                tally.status.current_a = Some(state.current_a);
+            }
+            MotorEvent::Health(motor, health) => {
+                let tally = &mut self.motors[*motor as usize];
+                tally.status.temperature_c = Some(health.temperature_c);
+                tally.status.health = Some(*health);
+            }
+            MotorEvent::Acknowledged { .. } | MotorEvent::Asked { .. } | MotorEvent::TurnsLost { .. } => {}
+        }
+    }
+
+    pub(super) fn imu(&mut self, reading: &ImuReading) {
+        self.imu.heard = Some(reading.time);
+        self.imu.rate.add(reading.time, 1.0);
+        if reading.temperature_c.is_some() {
+            self.imu.status.temperature_c = reading.temperature_c;
+        }
+    }
+
+    pub(super) fn lost(&mut self, count: u64) {
+        self.counters.lost += count;
+    }
+
+    /// Counts that the bus keeps.
+    pub(super) fn bus(&mut self, dropped: u64, errors: u64, reconnects: u64) {
+        self.counters.dropped = dropped;
+        self.counters.errors = errors;
+        self.counters.reconnects = reconnects;
+    }
+
+    /// Counts that the IMU's decoder keeps.
+    pub(super) fn imu_packets(&mut self, intact: u64, corrupted: u64, stray_bytes: u64) {
+        let status = &mut self.imu.status;
+        (status.packets, status.corrupted, status.stray_bytes) = (intact, corrupted, stray_bytes);
+    }
+
+    /// A row of the recording.
+    pub(super) fn row(&self, sample: &Sample) -> Row {
+        let [left, right] = &self.motors;
+        let voltage = |motor: &MotorTally| motor.status.health.map(|health| health.voltage_v);
+        Row {
+            sample: *sample,
+            motor_temperature_c: [left.status.temperature_c, right.status.temperature_c],
+            bus_voltage_v: voltage(left).or_else(|| voltage(right)),
+        }
+    }
+
+    /// When anything was heard last.
+    pub(super) fn heard(&self) -> Option<Duration> {
+        Motor::BOTH
+            .into_iter()
+            .filter_map(|motor| self.motors[motor as usize].heard)
+            .chain(self.imu.heard)
+            .max()
+    }
+
+    pub(super) fn counters(&mut self, now: Duration, unrecorded: u64) -> Counters {
+        self.counters.received_hz = self.received.per_second(now);
+        let bits = self.bits.per_second(now);
+        self.counters.bus_load = self.bit_rate.map(|rate| bits / f64::from(rate));
+        Counters { lost: self.counters.lost + unrecorded, ..self.counters }
+    }
+
+    pub(super) fn motor_status(&mut self, now: Duration) -> [MotorStatus; 2] {
+        self.motors.each_mut().map(|tally| MotorStatus {
+            rate_hz: tally.rate.per_second(now),
+            age: tally.heard.map(|heard| now.saturating_sub(heard)),
+            // The answers to the newest two may still be under way.
+            missed: tally.asked.saturating_sub(tally.answered + 2),
+            ..tally.status
+        })
+    }
+
+    pub(super) fn imu_status(&mut self, now: Duration) -> ImuStatus {
+        ImuStatus {
+            rate_hz: self.imu.rate.per_second(now),
+            age: self.imu.heard.map(|heard| now.saturating_sub(heard)),
+            ..self.imu.status
+        }
+    }
+}
