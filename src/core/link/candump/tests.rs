@@ -125,8 +125,8 @@ fn what_is_wrong_is_told_with_its_column() {
         ("(1.0) can0 141#1122334455667788_8", 32, BadLengthCode),
         ("(1.0) can0 141#1122334455667788_", 32, BadLengthCode),
         ("(1.0) can0 141#80:10:11223344#00", 16, Xl),
-        ("(1.0) can0 141#00 X", 20, BadDirection),
-        ("(1.0) can0 141#00 R R", 22, Excess),
+        ("(1.0) can0 141#00 X", 19, BadDirection),
+        ("(1.0) can0 141#00 R R", 21, Excess),
         ("(1.0) can0 141 [3] A1 00", 25, OtherLength { length: 3, bytes: 2 }),
         ("(1.0) can0 141 [1] A1 00", 23, Excess),
         ("(1.0) can0 141 [9] A1 00", 16, BadLength),
@@ -167,7 +167,7 @@ fn another_implementation_agrees() {
 fn random_entry(random: &mut ChaCha8Rng) -> Entry<'static> {
     let mut data = [0; 64];
     random.fill_bytes(&mut data);
-    let id = if random.next_u32() % 2 == 0 {
+    let id = if random.next_u32().is_multiple_of(2) {
         FrameId::Standard((random.next_u32() & 0x7FF) as u16)
     } else {
         FrameId::Extended(random.next_u32() & 0x1FFF_FFFF)
@@ -195,7 +195,7 @@ fn ten_million_random_and_flipped_bytes_are_read_without_harm() {
     let (mut bytes, mut accepted) = (0, 0_u32);
     let mut line = String::new();
     while bytes < 10_000_000 {
-        let mut raw = if random.next_u32() % 4 == 0 {
+        let mut raw = if random.next_u32().is_multiple_of(4) {
             let mut raw = vec![0; random.next_u32() as usize % 2000];
             random.fill_bytes(&mut raw);
             raw

@@ -188,7 +188,7 @@ fn a_frame_of_any_kind_comes_through_both_ways() {
     for round in 0..20_000 {
         let data = random.next_u64().to_le_bytes();
         let length = round % 9;
-        let id = if random.next_u32() % 2 == 0 {
+        let id = if random.next_u32().is_multiple_of(2) {
             FrameId::Standard((random.next_u32() & 0x7FF) as u16)
         } else {
             FrameId::Extended(random.next_u32() & 0x1FFF_FFFF)
