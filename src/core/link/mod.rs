@@ -6,9 +6,11 @@
 mod bus;
 pub mod bus_load;
 pub mod candump;
+pub mod dbc;
 mod emulator;
 mod faulty;
 mod frame;
+pub mod ht8115;
 mod imu;
 pub mod jy901;
 pub mod lk;
