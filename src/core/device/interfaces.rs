@@ -10,6 +10,7 @@ use serde::Serialize;
 use super::bus_health::BusState;
 pub use advice::Advice;
 pub use serial::SerialPort;
+pub(super) use serial::{stable_name, why_no_port};
 #[cfg(target_os = "linux")]
 pub(super) use sysfs::{bit_rate, require_up, why_no_interface};
 

@@ -11,8 +11,11 @@ mod lateness;
 mod open;
 mod open_error;
 mod pacer;
+#[cfg(all(test, unix))]
+mod pty_tests;
 mod reconnect;
 mod recorder;
+mod retry;
 mod serial;
 mod session;
 mod slcan;
@@ -22,7 +25,7 @@ pub use bus_health::{BusHealth, BusState};
 #[cfg(target_os = "linux")]
 pub use can::SocketCan;
 pub use clock::Clock;
-pub use imu_port::{ImuPort, open_imu};
+pub use imu_port::{ImuConfigureError, ImuPort, open_imu};
 pub use interfaces::{Advice, CanInterface, Interfaces, SerialPort, interfaces};
 pub use lateness::Lateness;
 pub use open::{BusPair, open_bus};

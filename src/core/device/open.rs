@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::bus_health::BusHealth;
 use super::clock::Clock;
+use super::interfaces;
 use super::open_error::OpenError;
 use super::reconnect::{self, Halves, Opener};
 use super::session::Source;
@@ -47,9 +48,11 @@ fn can(interface: &str, listen_only: bool, health: &Arc<BusHealth>) -> Opener {
 }
 
 fn slcan(port: &str, bit_rate: u32, listen_only: bool, health: &Arc<BusHealth>) -> Opener {
-    let (port, health) = (port.to_owned(), Arc::clone(health));
+    let (mut port, health) = (port.to_owned(), Arc::clone(health));
     Box::new(move || {
         let (reader, writer) = super::slcan::open(&port, bit_rate, listen_only, &health)?;
+        // Where it is plugged in elsewhere it may get another number, but keeps this name.
+        port = interfaces::stable_name(&port).unwrap_or_else(|| port.clone());
         Ok(Halves { reader: Box::new(reader), writer: writer.map(|bus| Box::new(bus) as Box<dyn Bus>) })
     })
 }

@@ -56,20 +56,21 @@ pub enum OpenError {
         mend: String,
     },
     /// Another program has it.
-    #[error("{port} is in use by {user}: close the other program (slcand, ModemManager, a terminal)")]
+    #[error(
+        "{port} is in use: close the other program (slcand, ModemManager, a terminal; `fuser -v {port}` tells)"
+    )]
     InUse {
         /// The port.
         port: String,
-        /// Who uses it, as far as the system tells.
-        user: String,
     },
     /// A bit rate that the adapter's protocol has not.
-    #[error("SLCAN has no bit rate of {bit_rate} bit/s: choose {allowed}")]
+    #[error(
+        "SLCAN has no bit rate of {bit_rate} bit/s: it has 10000, 20000, 50000, 100000, 125000, 250000, 500000, 800000 \
+         and 1000000"
+    )]
     BitRate {
         /// What was asked for.
         bit_rate: u32,
-        /// What there is.
-        allowed: String,
     },
     /// An adapter that does not do what it is told.
     #[error(

@@ -8,6 +8,7 @@ use std::time::Duration;
 use super::bus_health::BusHealth;
 use super::clock::Clock;
 use super::open_error::OpenError;
+use super::retry::Retry;
 use crate::link::{Bus, BusError, Frame, StampedFrame};
 
 /// A bus just opened: one half for the thread that reads, and one for the thread that sends, if any may.
@@ -19,9 +20,6 @@ pub(super) struct Halves {
 /// Opens the bus, again and again.
 pub(super) type Opener = Box<dyn FnMut() -> Result<Halves, OpenError> + Send>;
 
-/// Shortest and longest time between two tries.
-const PAUSES: [Duration; 2] = [Duration::from_millis(200), Duration::from_secs(2)];
-
 /// The reading half. A loss is told once, as an error; from then on nothing is received until the bus is back, and
 /// every [`Bus::wait`] looks for it when it is time.
 pub(super) struct Reconnecting {
@@ -31,8 +29,7 @@ pub(super) struct Reconnecting {
     reader: Option<Box<dyn Bus>>,
     writer: Arc<Slot>,
     health: Arc<BusHealth>,
-    next_try: Duration,
-    pause: Duration,
+    retry: Retry,
 }
 
 /// Where the reading half puts the sending half of the bus that is open just now.
@@ -77,8 +74,7 @@ pub(super) fn keep_open(
         reader: Some(halves.reader),
         writer,
         health,
-        next_try: Duration::ZERO,
-        pause: PAUSES[0],
+        retry: Retry::default(),
     };
     Ok(Halves { reader: Box::new(reader), writer: sender })
 }
@@ -88,15 +84,14 @@ impl Reconnecting {
     fn lose(&mut self, error: BusError) -> BusError {
         self.reader = None;
         *self.writer.bus() = None;
-        self.next_try = self.clock.now() + self.pause;
+        self.retry.after_loss(self.clock.now());
         self.health.set_lost(error.to_string());
         error
     }
 
     fn look(&mut self, timeout: Duration) {
-        let now = self.clock.now();
-        thread::sleep(timeout.min(self.next_try.saturating_sub(now)));
-        if self.clock.now() < self.next_try {
+        thread::sleep(timeout.min(self.retry.time_left(self.clock.now())));
+        if !self.retry.is_due(self.clock.now()) {
             return;
         }
         match (self.open)() {
@@ -108,10 +103,9 @@ impl Reconnecting {
             }
             Err(error) => {
                 self.health.set_lost(error.to_string());
-                self.next_try = self.clock.now() + self.pause;
+                self.retry.after_failure(self.clock.now());
             }
         }
-        self.pause = (2 * self.pause).min(PAUSES[1]);
     }
 
     fn gone(&self) -> BusError {
@@ -131,7 +125,7 @@ impl Bus for Reconnecting {
         let Some(bus) = &mut self.reader else { return Ok(None) };
         match bus.receive(now) {
             Ok(Some(frame)) => {
-                self.pause = PAUSES[0];
+                self.retry.settle();
                 Ok(Some(frame))
             }
             Ok(None) if self.writer.broken.load(Ordering::Relaxed) => {

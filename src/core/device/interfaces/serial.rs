@@ -7,6 +7,9 @@ use std::path::Path;
 use serde::Serialize;
 use serialport::SerialPortType;
 
+use super::present;
+use crate::device::open_error::OpenError;
+
 /// A serial port.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct SerialPort {
@@ -52,8 +55,14 @@ pub(super) fn serial_ports() -> Vec<SerialPort> {
     ports
 }
 
+/// Why no port of that name could be opened.
+pub(in crate::device) fn why_no_port(port: &str) -> OpenError {
+    let names: Vec<_> = serial_ports().into_iter().map(|port| port.port).collect();
+    OpenError::NoPort { port: port.to_owned(), present: present(&names) }
+}
+
 /// The name of a port that stays the same wherever it is plugged in.
-fn stable_name(port: &str) -> Option<String> {
+pub(in crate::device) fn stable_name(port: &str) -> Option<String> {
     let target = fs::canonicalize(port).ok()?;
     let links = fs::read_dir("/dev/serial/by-id").ok()?.flatten().map(|entry| entry.path());
     let link = links.filter(|link| fs::canonicalize(link).is_ok_and(|path| path == target)).min()?;
