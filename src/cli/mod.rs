@@ -2,6 +2,7 @@
 
 mod convert;
 mod drive;
+mod emulate;
 mod export;
 mod file;
 mod fit;
@@ -52,6 +53,8 @@ enum Command {
     Simulate(simulate::Arguments),
     /// Every experiment of the paper on the simulated robot, ours beside theirs
     Reproduce(reproduce::Arguments),
+    /// A simulated robot that speaks the real robot's protocols, on a CAN interface or pseudo-terminals
+    Emulate(Box<emulate::Arguments>),
     /// Write a recording as an MCAP file, which Foxglove, PlotJuggler and Rerun open
     Convert(convert::Arguments),
     /// Write what a robot's firmware or a script takes over
@@ -80,6 +83,7 @@ pub(crate) fn run(cli: Cli) -> ExitCode {
         Some(Command::Fit(arguments)) => fit::run(&arguments, &output),
         Some(Command::Simulate(arguments)) => simulate::run(&arguments, &output),
         Some(Command::Reproduce(arguments)) => reproduce::run(&arguments, &output),
+        Some(Command::Emulate(arguments)) => emulate::run(&arguments, &output),
         Some(Command::Convert(arguments)) => convert::run(&arguments, &output),
         Some(Command::Export(arguments)) => export::run(&arguments, &output),
         Some(Command::Monitor(arguments)) => monitor::run(&arguments, &output),

@@ -5,12 +5,16 @@ mod bus_health;
 #[cfg(target_os = "linux")]
 mod can;
 mod clock;
+#[cfg(unix)]
+mod emulator;
 mod imu_port;
 mod interfaces;
 mod lateness;
 mod open;
 mod open_error;
 mod pacer;
+#[cfg(unix)]
+mod pty;
 #[cfg(all(test, unix))]
 mod pty_tests;
 mod reconnect;
@@ -25,6 +29,8 @@ pub use bus_health::{BusHealth, BusState};
 #[cfg(target_os = "linux")]
 pub use can::SocketCan;
 pub use clock::Clock;
+#[cfg(unix)]
+pub use emulator::{EmulatorCounts, EmulatorPorts, EmulatorServer};
 pub use imu_port::{ImuConfigureError, ImuPort, open_imu};
 pub use interfaces::{Advice, CanInterface, Interfaces, SerialPort, interfaces};
 pub use lateness::Lateness;

@@ -20,7 +20,9 @@ pub mod slcan;
 mod wheels;
 
 pub use bus::{Bus, BusError};
-pub use emulator::{EmulatedBus, Emulator, EmulatorSettings, Fault, FaultError, Place, TimedFault};
+pub use emulator::{
+    EmulatedAdapter, EmulatedBus, Emulator, EmulatorSettings, Fault, FaultError, Place, TimedFault,
+};
 pub use faulty::{FaultCounts, FaultRates, Faulty};
 pub use frame::{Direction, Frame, FrameId, FrameKind, StampedFrame};
 pub use imu::{ImuAssembler, ImuReading};

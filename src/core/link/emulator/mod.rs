@@ -15,6 +15,7 @@
 //! 1 s after the last torque, the motors being off or the robot down, it is carried back. With its wheels in the
 //! air it stays on the stand, and the motors turn.
 
+mod adapter;
 mod bus;
 mod fault;
 mod flood;
@@ -38,6 +39,7 @@ use crate::model_file::RobotModel;
 use crate::robot::{Actuation, LinkSettings, Motor, State, TICK_S};
 use crate::simulate::{Ground, Pose, SimulatedRobot, SimulationError, SimulationSettings};
 
+pub use adapter::EmulatedAdapter;
 pub use bus::EmulatedBus;
 pub use fault::{Fault, FaultError, TimedFault};
 pub use hand::Place;

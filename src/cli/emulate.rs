@@ -1,0 +1,262 @@
+//! `flqr emulate`: a simulated robot that speaks the real robot's protocols.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use clap::Args;
+use flqr_core::control::{BalanceController, ControllerKind};
+use flqr_core::link::lk::ReplyId;
+use flqr_core::link::{EmulatorSettings, TimedFault};
+use flqr_core::lqr;
+use flqr_core::model_file::{RobotModel, presets};
+use flqr_core::robot::LinkSettings;
+use serde_json::Value;
+
+use super::input;
+use super::output::{Failure, Output};
+
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// Model file (TOML) of the robot [default: that of the paper]
+    model: Option<PathBuf>,
+    #[command(flatten)]
+    ports: Ports,
+    /// Seed of all noise
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// The robot balances by itself (FLQR of its model), and its controller's frames are on the bus: to listen to
+    #[arg(long, conflicts_with = "wheels_in_air")]
+    balancing: bool,
+    /// Its stand keeps the wheels off the ground
+    #[arg(long)]
+    wheels_in_air: bool,
+    /// Identifier that the motors answer on, 0x140 or 0x180 + number: sources disagree
+    #[arg(long, value_name = "ID", default_value = "0x140", value_parser = reply_id)]
+    reply_id: ReplyId,
+    /// A key of [link] in which the robot is not as its model says, such as current_steps_per_a=62.5 or
+    /// pitch_direction=backward; repeatable
+    #[arg(long, value_name = "KEY=VALUE")]
+    actual: Vec<Override>,
+    /// What goes wrong and when, such as left-vanishes@10: {left|right}-vanishes, -returns, -errors=BITS,
+    /// -temperature=C, or voltage=V, imu-silent, imu-frozen, imu-returns, bus-off, bus-on, push=N; repeatable
+    #[arg(long, value_name = "FAULT@SECONDS")]
+    fault: Vec<TimedFault>,
+    /// Frames of other devices that fill the bus, in a second; each has its number in its first four bytes
+    #[arg(long, value_name = "HZ", default_value_t = 0, value_parser = clap::value_parser!(u32).range(..=100_000))]
+    flood: u32,
+    /// Time to run, s [default: until it is ended, or its standard input, if that is a pipe]
+    #[arg(long, value_parser = seconds)]
+    seconds: Option<f64>,
+}
+
+/// Where the robot is reached. Without any of them: --slcan --imu.
+#[derive(Args)]
+struct Ports {
+    /// Motors on this CAN interface
+    #[arg(long, value_name = "INTERFACE")]
+    can: Option<String>,
+    /// Motors behind an SLCAN adapter on a pseudo-terminal
+    #[arg(long)]
+    slcan: bool,
+    /// IMU on a pseudo-terminal
+    #[arg(long)]
+    imu: bool,
+}
+
+/// One key of `[link]` and its value.
+#[derive(Clone)]
+struct Override {
+    key: String,
+    value: Value,
+}
+
+impl FromStr for Override {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (key, value) = text.split_once('=').ok_or("it must be KEY=VALUE, as in imu_rate_hz=100")?;
+        let value = value.parse().unwrap_or_else(|_| Value::String(value.to_owned()));
+        Ok(Self { key: key.to_owned(), value })
+    }
+}
+
+fn reply_id(text: &str) -> Result<ReplyId, String> {
+    match text {
+        "0x140" => Ok(ReplyId::Shared),
+        "0x180" => Ok(ReplyId::Apart),
+        _ => Err("it must be 0x140 or 0x180".to_owned()),
+    }
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(seconds) if (0.001..=1e6).contains(&seconds) => Ok(seconds),
+        _ => Err("it must be a number of seconds from 0.001 to 1000000".to_owned()),
+    }
+}
+
+pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
+    let (name, robot) = match &arguments.model {
+        Some(path) => input::load_robot(path)?,
+        None => {
+            let model = presets::paper();
+            let robot = model.robot().expect("the paper's preset is a robot").clone();
+            (model.name, robot)
+        }
+    };
+    let settings = EmulatorSettings {
+        seed: arguments.seed,
+        wheels_in_air: arguments.wheels_in_air,
+        on_board: arguments.balancing.then(|| controller(&robot)).transpose()?,
+        actual: actual(&robot.link, &arguments.actual)?,
+        reply_id: arguments.reply_id,
+        flood_hz: arguments.flood,
+        faults: arguments.fault.clone(),
+    };
+    serve::run(arguments, &name, &robot, settings, output)
+}
+
+/// The robot's own controller: FLQR where friction is known.
+fn controller(robot: &RobotModel) -> Result<BalanceController, Failure> {
+    let Some(weights) = &robot.weights else {
+        let missing = "--balancing needs a controller: give the model a table [lqr] with its weights";
+        return Err(Failure::Message(missing.to_owned()));
+    };
+    let design = lqr::design(&robot.parameters.linear_model(), weights).map_err(Failure::from_error)?;
+    let known = robot.friction.iter().any(Option::is_some);
+    let kind = if known { ControllerKind::Flqr } else { ControllerKind::Lqr };
+    BalanceController::new(kind, robot, design.gain).map_err(Failure::from_error)
+}
+
+/// The wiring with what differs from the model's; none if nothing does.
+fn actual(declared: &LinkSettings, overrides: &[Override]) -> Result<Option<LinkSettings>, Failure> {
+    if overrides.is_empty() {
+        return Ok(None);
+    }
+    let refused = |error: serde_json::Error| Failure::Message(format!("--actual: {error}"));
+    let mut wiring = serde_json::to_value(declared).map_err(refused)?;
+    for Override { key, value } in overrides {
+        wiring[key] = value.clone();
+    }
+    serde_json::from_value(wiring).map(Some).map_err(refused)
+}
+
+#[cfg(unix)]
+mod serve {
+    use std::fs::File;
+    use std::io::{self, Read, Write};
+    use std::os::fd::AsFd;
+    use std::os::unix::fs::FileTypeExt;
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicBool, Ordering};
+    use std::thread;
+
+    use flqr_core::device::{EmulatorPorts, EmulatorServer};
+    use flqr_core::link::{Emulator, EmulatorSettings};
+    use flqr_core::model_file::RobotModel;
+    use serde::Serialize;
+
+    use super::Arguments;
+    use crate::cli::output::{Failure, Output, complain};
+
+    /// Keys of the JSON object; a port that is not there is left out.
+    #[derive(Serialize)]
+    struct Opened<'a> {
+        #[serde(skip_serializing_if = "Option::is_none")]
+        can: Option<&'a str>,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        slcan: Option<&'a str>,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        imu: Option<&'a str>,
+        robot: &'a str,
+        seed: u64,
+    }
+
+    pub(super) fn run(
+        arguments: &Arguments,
+        name: &str,
+        robot: &RobotModel,
+        settings: EmulatorSettings,
+        output: &Output,
+    ) -> Result<(), Failure> {
+        let mut emulator = Emulator::new(robot, settings).map_err(Failure::from_error)?;
+        let given = &arguments.ports;
+        let none = given.can.is_none() && !given.slcan && !given.imu;
+        let ports =
+            EmulatorPorts { can: given.can.clone(), slcan: given.slcan || none, imu: given.imu || none };
+        let mut server = EmulatorServer::open(&ports).map_err(Failure::from_error)?;
+        let opened = Opened {
+            can: given.can.as_deref(),
+            slcan: server.slcan_port(),
+            imu: server.imu_port(),
+            robot: name,
+            seed: arguments.seed,
+        };
+        output.result(&opened, |out| print(out, &opened))?;
+        let input_ended = watch_input();
+        let counts = server.run(&mut emulator, &mut |now| {
+            arguments.seconds.is_some_and(|seconds| now.as_secs_f64() >= seconds)
+                || input_ended.load(Ordering::Relaxed)
+        });
+        complain(&format!(
+            "{} frames of the robot, {} not taken by the SLCAN port's client, {} not by the CAN interface",
+            counts.frames, counts.slcan_dropped, counts.can_refused
+        ));
+        Ok(())
+    }
+
+    fn print(out: &mut dyn Write, opened: &Opened) -> io::Result<()> {
+        writeln!(out, "{}, seed {}", opened.robot, opened.seed)?;
+        for (what, port) in [("CAN", opened.can), ("SLCAN", opened.slcan), ("IMU", opened.imu)] {
+            port.map_or(Ok(()), |port| writeln!(out, "  {what:6}{port}"))?;
+        }
+        let motors = opened.can.map(|name| format!("can:{name}"));
+        let motors = motors.or(opened.slcan.map(|port| format!("slcan:{port}")));
+        let imu = opened.imu.map_or(String::new(), |port| format!(" --imu serial:{port}@115200"));
+        motors.map_or(Ok(()), |motors| writeln!(out, "\nin another terminal: flqr monitor {motors}{imu}"))
+    }
+
+    /// Tells when whoever holds the other end of standard input has closed it. Only a pipe is watched: a terminal
+    /// ends its programs itself, and a file or /dev/null has no other end.
+    fn watch_input() -> Arc<AtomicBool> {
+        let ended = Arc::new(AtomicBool::new(false));
+        let pipe = io::stdin().as_fd().try_clone_to_owned().map(File::from);
+        let pipe = pipe.ok().filter(|file| {
+            file.metadata().is_ok_and(|data| data.file_type().is_fifo() || data.file_type().is_socket())
+        });
+        if let Some(mut pipe) = pipe {
+            let told = Arc::clone(&ended);
+            let watch = move || {
+                let mut bytes = [0; 256];
+                while pipe.read(&mut bytes).is_ok_and(|count| count > 0) {}
+                told.store(true, Ordering::Relaxed);
+            };
+            // Without the thread, the emulator runs until it is ended.
+            if let Err(error) = thread::Builder::new().name("stdin".to_owned()).spawn(watch) {
+                complain(&format!("warning: the end of standard input cannot be watched: {error}"));
+            }
+        }
+        ended
+    }
+}
+
+#[cfg(not(unix))]
+mod serve {
+    use flqr_core::link::EmulatorSettings;
+    use flqr_core::model_file::RobotModel;
+
+    use super::Arguments;
+    use crate::cli::output::{Failure, Output};
+
+    pub(super) fn run(
+        _: &Arguments,
+        _: &str,
+        _: &RobotModel,
+        _: EmulatorSettings,
+        _: &Output,
+    ) -> Result<(), Failure> {
+        let missing = "this system has neither pseudo-terminals nor SocketCAN: run `flqr emulate` on Linux or macOS, \
+                       or choose the source `emulated` in monitor, drive and the window";
+        Err(Failure::Message(missing.to_owned()))
+    }
+}
