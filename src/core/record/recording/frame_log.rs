@@ -1,9 +1,10 @@
 //! Reading raw frames of any length, one by one.
 
+use std::fmt::Display;
 use std::io::{BufRead, Read};
 
-use super::frames::parse_line as parse;
-use crate::link::StampedFrame;
+use crate::link::candump::{self, Entry, LoggedFrame};
+use crate::link::{Direction, StampedFrame};
 use crate::record::{LineProblem, LogError};
 
 /// A line longer than this is damage, not a frame.
@@ -15,6 +16,7 @@ pub struct FrameLog<'a, R> {
     reader: R,
     source: &'a str,
     line: Vec<u8>,
+    interface: String,
     number: u64,
     bytes: u64,
     frames: u64,
@@ -29,6 +31,7 @@ impl<'a, R: BufRead> FrameLog<'a, R> {
             reader,
             source,
             line: Vec::new(),
+            interface: String::new(),
             number: 0,
             bytes: 0,
             frames: 0,
@@ -57,18 +60,18 @@ impl<'a, R: BufRead> FrameLog<'a, R> {
     /// # Errors
     /// [`LogError::Io`], and [`LogError::MostlyBad`] at the end of a file without a single frame.
     pub fn next_frame(&mut self) -> Result<Option<(&str, StampedFrame)>, LogError> {
-        let found = loop {
-            if !self.next_line()? {
-                return self.end().map(|()| None);
-            }
+        while self.next_line()? {
             match parse(&self.line) {
-                Ok(found) => break found,
+                Ok((interface, frame)) => {
+                    self.frames += 1;
+                    self.interface.clear();
+                    self.interface.push_str(interface);
+                    return Ok(Some((&self.interface, frame)));
+                }
                 Err(problem) => self.complain(problem),
             }
-        };
-        self.frames += 1;
-        let (interface, frame) = found;
-        Ok(Some((std::str::from_utf8(&self.line[interface]).unwrap_or("?"), frame)))
+        }
+        self.end().map(|()| None)
     }
 
     /// Reads the next line that is not blank and has an end.
@@ -123,12 +126,24 @@ impl<'a, R: BufRead> FrameLog<'a, R> {
     }
 }
 
+/// The interface and the frame of a line that is not blank.
+fn parse(line: &[u8]) -> Result<(&str, StampedFrame), String> {
+    let left_out = |problem: &dyn Display| format!("{problem}, the line was left out");
+    let text = std::str::from_utf8(line).map_err(|_| left_out(&"this is not text"))?;
+    let entry = candump::parse_line(text).map_err(|error| left_out(&error))?;
+    let Entry { time, interface, frame, direction } = entry.ok_or_else(|| left_out(&"there is no frame"))?;
+    let LoggedFrame::Classic { frame, .. } = frame else {
+        return Err(left_out(&"CAN FD frames are not the robot's"));
+    };
+    Ok((interface, StampedFrame { time, direction: direction.unwrap_or(Direction::Received), frame }))
+}
+
 #[cfg(test)]
 mod tests {
     use std::time::Duration;
 
     use super::*;
-    use crate::link::{Direction, Frame, FrameId};
+    use crate::link::{Frame, FrameId};
 
     fn read(text: &[u8]) -> (Vec<(String, StampedFrame)>, u64, Option<String>) {
         let mut log = FrameLog::new(text, "run.log");
