@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use flqr_core::device::{SerialAddress, Source};
 use flqr_core::model_file::presets;
 use flqr_core::record::Mapping;
 use flqr_gui::{Tab, WindowOptions};
@@ -24,6 +25,12 @@ pub(crate) struct Arguments {
     /// Tab to begin with
     #[arg(long, value_enum)]
     tab: Option<TabName>,
+    /// Robot to connect to at once, listening only: can:can0, slcan:/dev/ttyACM0@1000000, emulated, replay:FILE
+    #[arg(long, value_name = "SOURCE")]
+    source: Option<Source>,
+    /// IMU of a robot on CAN, as serial:/dev/ttyUSB0@115200
+    #[arg(long, value_name = "serial:DEV@BAUD", value_parser = imu)]
+    imu: Option<SerialAddress>,
     /// Start with the simulated robot paused
     #[arg(long)]
     paused: bool,
@@ -37,6 +44,7 @@ enum TabName {
     Tune,
     Friction,
     Experiments,
+    Robot,
 }
 
 pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
@@ -47,6 +55,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
     let tab = match (arguments.tab, &arguments.log) {
         (Some(TabName::Friction), _) | (None, Some(_)) => Tab::Friction,
         (Some(TabName::Experiments), _) => Tab::Experiments,
+        (Some(TabName::Robot), _) => Tab::Robot,
         (Some(TabName::Tune), _) | (None, None) => Tab::Tune,
     };
     let options = WindowOptions {
@@ -54,9 +63,20 @@ pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
         log: arguments.log,
         column_map: arguments.map,
         tab,
+        source: arguments.source,
+        imu: arguments.imu,
         paused: arguments.paused,
         state_out: arguments.state_out,
         ..WindowOptions::new(model)
     };
     flqr_gui::run(options).map_err(Failure::from_error)
+}
+
+/// Reads `serial:DEV@BAUD`.
+fn imu(text: &str) -> Result<SerialAddress, String> {
+    let error = || format!("`{text}` is no IMU: give serial:DEV@BAUD, as serial:/dev/ttyUSB0@115200");
+    let (port, baud) =
+        text.strip_prefix("serial:").and_then(|rest| rest.rsplit_once('@')).ok_or_else(error)?;
+    let baud = baud.parse().ok().filter(|baud| *baud > 0).ok_or_else(error)?;
+    if port.is_empty() { Err(error()) } else { Ok(SerialAddress { port: port.to_owned(), baud }) }
 }

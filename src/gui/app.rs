@@ -21,6 +21,7 @@ use crate::history::{Channel, History};
 use crate::job::{Job, Outcome, Waker};
 use crate::live::{Live, LiveCommand};
 use crate::recent::{Recent, RecentFile};
+use crate::robot::{Link, RobotTab};
 use crate::session::Session;
 use crate::state_out::StateOut;
 use crate::tune::TuneTab;
@@ -36,6 +37,8 @@ pub enum Tab {
     Friction,
     /// The paper's experiments on the simulated robot.
     Experiments,
+    /// A real robot: connection, health, arming, recording.
+    Robot,
 }
 
 /// The last message, for the status line.
@@ -67,13 +70,15 @@ pub struct App {
     tab: Tab,
     source: Source,
     /// What the simulated robot goes back to when it is shown again.
-    paused_before_can: bool,
+    paused_before: bool,
     designer: Designer,
     live: Live,
     history: History,
     tune: TuneTab,
     friction: FrictionTab,
     experiments: ExperimentsTab,
+    link: Link,
+    robot: RobotTab,
     commands: Commands,
     status: Status,
     recent: Recent,
@@ -107,12 +112,14 @@ impl App {
             model_path: options.model_path,
             tab: options.tab,
             source: Source::default(),
-            paused_before_can: options.paused,
+            paused_before: options.paused,
             designer: Designer::default(),
             live: Live::start(&waker, options.paused)?,
             history: History::default(),
             friction: FrictionTab::new(&options.column_map),
             experiments: ExperimentsTab::default(),
+            link: Link::new(options.devices),
+            robot: RobotTab::default(),
             commands: Commands::default(),
             status: Status::default(),
             recent: Recent::default(),
@@ -132,12 +139,24 @@ impl App {
         if let Some(log) = options.log {
             app.commands.send(Command::LoadLog(log));
         }
+        if let Some(imu) = &options.imu {
+            app.robot.form.fill_imu(imu);
+        }
+        if let Some(source) = &options.source {
+            app.robot.form.fill(source);
+            app.commands.send(Command::SelectSource(source.into()));
+            app.commands.send(Command::Connect);
+        }
+        if options.tab == Tab::Robot {
+            app.commands.send(Command::RefreshInterfaces);
+        }
         Ok(app)
     }
 
     /// Applies what views asked for, and takes in what threads have brought. Draws nothing.
     pub fn logic(&mut self, ctx: &Context) {
         self.drain_live();
+        self.drain_link();
         self.drain_jobs();
         self.take_dropped_files(ctx);
         if self.tab == Tab::Experiments {
@@ -163,16 +182,30 @@ impl App {
         let context = ViewContext {
             session: &self.session,
             designer: &self.designer,
-            history: &self.history,
+            history: if self.source == Source::Simulated { &self.history } else { &self.link.history },
             live: &self.live.status,
+            link: &self.link,
             recent: &self.recent,
             source: self.source,
             commands: &self.commands,
         };
-        match self.tab {
-            Tab::Tune => self.tune.ui(&context, ui),
-            Tab::Friction => self.friction.ui(&context, ui),
-            Tab::Experiments => self.experiments.ui(&context, ui),
+        let stop = match self.tab {
+            Tab::Robot => self.robot.ui(&context, ui),
+            Tab::Tune => {
+                self.tune.ui(&context, ui);
+                false
+            }
+            Tab::Friction => {
+                self.friction.ui(&context, ui);
+                false
+            }
+            Tab::Experiments => {
+                self.experiments.ui(&context, ui);
+                false
+            }
+        };
+        if stop {
+            self.link.stop();
         }
     }
 
@@ -180,6 +213,23 @@ impl App {
         let samples = self.live.poll();
         if !samples.is_empty() {
             self.history.extend(&samples);
+        }
+    }
+
+    fn drain_link(&mut self) {
+        let (updates, message) = self.link.drain();
+        for update in &updates {
+            self.robot.note(update);
+        }
+        self.robot.drain();
+        match message {
+            None => {}
+            Some(Ok(message)) => self.say(message),
+            Some(Err(problem)) => {
+                self.fail(problem);
+                // What is there may have changed.
+                self.robot.look(&self.link, &self.waker);
+            }
         }
     }
 
@@ -197,6 +247,7 @@ impl App {
                 Outcome::Running => {}
                 Outcome::Done(read) => {
                     self.friction.suggest_column_map(&read.column_map);
+                    self.robot.suggest(&read);
                     self.recent = read;
                     self.recent_job = None;
                 }
@@ -229,6 +280,7 @@ impl App {
                 self.tune.note_dialog_problem(purpose, &problem);
                 self.friction.note_dialog_problem(purpose, &problem);
                 self.experiments.note_dialog_problem(purpose, &problem);
+                self.robot.note_dialog_problem(purpose, &problem);
             }
         }
     }
@@ -272,12 +324,14 @@ impl App {
 
     fn send_robot(&mut self) {
         if let Some((robot, controller)) = self.robot_and_controller() {
+            self.link.set_controller(controller);
             self.live.send(LiveCommand::Robot(Box::new(robot), controller));
         }
     }
 
     fn send_controller(&mut self) {
         if let Some((_, controller)) = self.robot_and_controller() {
+            self.link.set_controller(controller);
             self.live.send(LiveCommand::Controller(controller));
         }
     }
@@ -309,10 +363,7 @@ impl App {
             Tab::Tune => "tune",
             Tab::Friction => "friction",
             Tab::Experiments => "experiments",
-        };
-        let source = match self.source {
-            Source::Simulated => "simulated",
-            Source::Can => "can",
+            Tab::Robot => "robot",
         };
         let controller = match self.session.controller {
             ControllerKind::Lqr => "lqr",
@@ -325,7 +376,7 @@ impl App {
             "model": self.session.name,
             "unsaved_changes": self.session != self.saved,
             "tab": tab,
-            "source": source,
+            "source": self.source.key(),
             "controller": controller,
             "q_diagonal": weights.q.diagonal().as_slice(),
             "r_diagonal": weights.r.diagonal().as_slice(),
@@ -342,6 +393,7 @@ impl App {
             },
             "friction_tab": self.friction.snapshot(),
             "experiments_tab": self.experiments.snapshot(),
+            "robot_tab": self.robot.snapshot(&self.link),
             "message": self.status.text,
         })
     }

@@ -4,6 +4,7 @@ use std::cell::RefCell;
 use std::path::PathBuf;
 
 use flqr_core::control::ControllerKind;
+use flqr_core::device::{SessionOrder, Source as DeviceSource};
 use flqr_core::friction::{Compensation, Stribeck};
 use flqr_core::lqr::Weights;
 use flqr_core::robot::RobotParameters;
@@ -17,8 +18,50 @@ pub(crate) enum Source {
     /// The simulated robot.
     #[default]
     Simulated,
-    /// A robot on a CAN bus.
+    /// A robot emulated in this program, behind the real bytes.
+    Emulated,
+    /// A robot on a CAN interface of the system.
     Can,
+    /// A robot behind an SLCAN adapter.
+    Slcan,
+    /// A recording.
+    Replay,
+}
+
+impl Source {
+    /// All, in the order in which they are offered, with a word of help.
+    pub(crate) const ALL: [(Self, &'static str, &'static str); 5] = [
+        (Self::Simulated, "simulated", "The simulated robot, in this program"),
+        (
+            Self::Emulated,
+            "emulated",
+            "The simulated robot behind the real bytes: try everything without hardware",
+        ),
+        (Self::Can, "CAN", "A robot on a CAN interface of this system"),
+        (Self::Slcan, "SLCAN", "A robot behind a CAN adapter on a serial port"),
+        (Self::Replay, "replay", "A recording, through the same path as live data"),
+    ];
+
+    /// Name for people.
+    pub(crate) fn name(self) -> &'static str {
+        Self::ALL[self as usize].1
+    }
+
+    /// Name for scripts.
+    pub(crate) fn key(self) -> String {
+        self.name().to_lowercase()
+    }
+}
+
+impl From<&DeviceSource> for Source {
+    fn from(source: &DeviceSource) -> Self {
+        match source {
+            DeviceSource::Can { .. } => Self::Can,
+            DeviceSource::Slcan { .. } => Self::Slcan,
+            DeviceSource::Emulated => Self::Emulated,
+            DeviceSource::Replay { .. } => Self::Replay,
+        }
+    }
 }
 
 /// Which motors a fitted curve goes to.
@@ -36,6 +79,8 @@ pub(crate) enum FilePurpose {
     SaveModel,
     OpenLog,
     SaveExperiment(SavedAs),
+    OpenReplay,
+    SaveRecording,
 }
 
 /// One wish of a view.
@@ -86,6 +131,17 @@ pub(crate) enum Command {
         path: PathBuf,
         replace: bool,
     },
+    /// Looks for CAN interfaces and serial ports.
+    RefreshInterfaces,
+    /// Opens the session that the form of the robot page describes.
+    Connect,
+    Disconnect,
+    /// To the session with the robot.
+    Order(SessionOrder),
+    /// Chooses a recording to replay.
+    ChooseReplay(PathBuf),
+    /// Chooses the file to record to.
+    ChooseRecording(PathBuf),
     /// One sentence for the status line.
     Say(String),
 }

@@ -16,6 +16,8 @@ const FASTEST_PERSON: Duration = Duration::from_millis(150);
 fn instead(purpose: FilePurpose) -> &'static str {
     match purpose {
         FilePurpose::SaveModel | FilePurpose::SaveExperiment(_) => "type a path above and press Save",
+        FilePurpose::SaveRecording => "type a path above and press Record",
+        FilePurpose::OpenReplay => "type the path above",
         FilePurpose::OpenModel | FilePurpose::OpenLog => {
             "type the path instead, or drop the file onto the window"
         }
@@ -56,6 +58,12 @@ fn ask(purpose: FilePurpose, suggestion: &str) -> Answer {
         FilePurpose::SaveModel => dialog.set_title("Save the model").set_file_name(suggestion).save_file(),
         FilePurpose::SaveExperiment(saved_as) => {
             dialog.set_title(saved_as.title()).set_file_name(suggestion).save_file()
+        }
+        FilePurpose::SaveRecording => {
+            dialog.set_title("Record to").add_filter("Log", &["csv"]).set_file_name(suggestion).save_file()
+        }
+        FilePurpose::OpenReplay => {
+            dialog.set_title("Replay a recording").add_filter("Recording", &["csv", "log"]).pick_file()
         }
         FilePurpose::OpenLog => dialog.set_title("Open a log").add_filter("Log", &["csv", "txt"]).pick_file(),
     };

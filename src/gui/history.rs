@@ -26,12 +26,18 @@ pub(crate) struct History {
     time_s: Vec<f64>,
     channels: [Vec<f64>; 3],
     generation: u64,
+    skipped: u64,
 }
 
 impl History {
-    /// Appends samples; times must not run back.
+    /// Appends samples. Those whose time runs back or is no number are left out: no plot has a place for them.
     pub(crate) fn extend(&mut self, samples: &[Sample]) {
         for sample in samples {
+            let last = self.time_s.last().copied().unwrap_or(f64::NEG_INFINITY);
+            if !sample.time_s.is_finite() || sample.time_s < last {
+                self.skipped += 1;
+                continue;
+            }
             self.time_s.push(sample.time_s);
             for (column, value) in
                 self.channels.iter_mut().zip([sample.x_m, sample.x_dot_m_s, sample.pitch_rad])
@@ -55,7 +61,13 @@ impl History {
         for column in &mut self.channels {
             column.clear();
         }
+        self.skipped = 0;
         self.generation += 1;
+    }
+
+    /// Samples that were left out.
+    pub(crate) fn skipped(&self) -> u64 {
+        self.skipped
     }
 
     /// Changes whenever the data do.

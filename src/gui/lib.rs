@@ -1,5 +1,5 @@
 //! The window of flqr: tune the balance controller of a simulated robot, fit friction from a measured log, compare
-//! LQR and FLQR in the paper's experiments.
+//! LQR and FLQR in the paper's experiments, watch and drive a real robot.
 //!
 //! # Architecture
 //! - One owner: [`App`] holds the session document, the design, the histories and the jobs.
@@ -22,6 +22,7 @@ mod live;
 pub mod plot;
 mod quantity;
 mod recent;
+pub mod robot;
 mod session;
 mod state_out;
 mod theme;

@@ -21,8 +21,16 @@ pub(crate) struct Recent {
     pub(crate) logs: Vec<PathBuf>,
     /// Models.
     pub(crate) models: Vec<PathBuf>,
+    /// Recordings that were replayed.
+    pub(crate) recordings: Vec<PathBuf>,
     /// The column map as typed last.
     pub(crate) column_map: String,
+    /// CAN interface connected to last.
+    pub(crate) can_interface: String,
+    /// SLCAN adapter connected to last: port and bit rate.
+    pub(crate) slcan: [String; 2],
+    /// IMU connected to last: port and baud rate.
+    pub(crate) imu: [String; 2],
 }
 
 impl Recent {
@@ -40,6 +48,10 @@ impl Recent {
 
     pub(crate) fn note_log(&mut self, path: &Path) {
         note(&mut self.logs, path);
+    }
+
+    pub(crate) fn note_recording(&mut self, path: &Path) {
+        note(&mut self.recordings, path);
     }
 
     pub(crate) fn note_model(&mut self, path: &Path) {

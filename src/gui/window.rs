@@ -1,11 +1,14 @@
 //! Opening the window, and one clear sentence when that cannot be done.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
+use flqr_core::device::{SerialAddress, Source};
 use flqr_core::model_file::Model;
 use flqr_core::record::Mapping;
 
 use crate::app::{App, Tab};
+use crate::robot::{Devices, System};
 
 /// How the window starts.
 #[derive(Clone, Debug)]
@@ -20,6 +23,12 @@ pub struct WindowOptions {
     pub column_map: Vec<Mapping>,
     /// The tab to begin with.
     pub tab: Tab,
+    /// A robot to connect to at once, listening only.
+    pub source: Option<Source>,
+    /// The IMU of a robot on CAN.
+    pub imu: Option<SerialAddress>,
+    /// What opens robots.
+    pub devices: Arc<dyn Devices>,
     /// Whether the simulated robot starts paused.
     pub paused: bool,
     /// A file that always holds what the window shows, as JSON.
@@ -37,6 +46,9 @@ impl WindowOptions {
             log: None,
             column_map: Vec::new(),
             tab: Tab::Tune,
+            source: None,
+            imu: None,
+            devices: Arc::new(System),
             paused: false,
             state_out: None,
             recent_file: crate::recent::default_file(),

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use egui::Context;
+use flqr_core::device::{SessionOptions, Source as DeviceSource};
 use flqr_core::model_file::{Model, presets};
 
 use super::{App, ModelJob, Saved, Tab};
@@ -26,6 +27,8 @@ pub(super) fn chosen(purpose: FilePurpose, path: PathBuf) -> Command {
         FilePurpose::SaveModel if path.extension().is_some() => Command::OverwriteModel(path),
         FilePurpose::SaveModel => Command::SaveModel(path),
         FilePurpose::OpenLog => Command::LoadLog(path),
+        FilePurpose::OpenReplay => Command::ChooseReplay(path),
+        FilePurpose::SaveRecording => Command::ChooseRecording(path),
         // The dialog knows one name as it was typed; what is written may have another or several.
         FilePurpose::SaveExperiment(saved_as) => Command::SaveExperiment { saved_as, path, replace: false },
     }
@@ -37,6 +40,7 @@ impl App {
             Command::SelectTab(tab) => {
                 self.tab = tab;
                 self.set_live_interval();
+                self.look_for_interfaces();
             }
             Command::SelectSource(source) => self.select_source(source),
             Command::SetWeights(weights) => {
@@ -107,34 +111,96 @@ impl App {
                     self.fail(problem);
                 }
             }
+            Command::RefreshInterfaces => self.robot.look(&self.link, &self.waker),
+            Command::Connect => self.connect(),
+            Command::Disconnect => self.disconnect(),
+            Command::Order(order) => self.link.send(order),
+            Command::ChooseReplay(path) => self.robot.form.replay = path.display().to_string(),
+            Command::ChooseRecording(path) => self.robot.note_recording_path(&path),
             Command::Say(text) => self.say(text),
         }
         ctx.request_repaint();
     }
 
     fn set_live_interval(&mut self) {
-        let shown = self.tab == Tab::Tune && self.source == Source::Simulated;
-        let interval = if shown { self.frame_interval } else { HIDDEN_INTERVAL };
-        self.live.send(LiveCommand::Interval(interval));
+        let interval = |shown: bool| if shown { self.frame_interval } else { HIDDEN_INTERVAL };
+        let simulated = self.source == Source::Simulated;
+        let live = interval(self.tab == Tab::Tune && simulated);
+        let link = interval(matches!(self.tab, Tab::Tune | Tab::Robot) && !simulated);
+        self.live.send(LiveCommand::Interval(live));
+        self.link.set_interval(link);
+    }
+
+    /// What is plugged in changes: looked up whenever the list comes into view.
+    fn look_for_interfaces(&mut self) {
+        let wired = matches!(self.source, Source::Can | Source::Slcan);
+        if self.tab == Tab::Robot && wired && !self.link.is_open() {
+            self.robot.look(&self.link, &self.waker);
+        }
+    }
+
+    fn connect(&mut self) {
+        if self.link.is_open() || self.link.is_opening() {
+            return self.fail("A robot is connected already: disconnect it first.");
+        }
+        let options = match self.robot.form.options(self.source, &self.session, &self.designer) {
+            Ok(options) => options,
+            Err(problem) => return self.fail(problem),
+        };
+        self.note_connection(&options);
+        self.robot.begin(&options);
+        self.tune.reset_view();
+        self.say(format!("Connecting to {}…", options.source));
+        self.link.open(options, &self.waker);
+        self.set_live_interval();
+    }
+
+    /// Remembers the connection for the next start of the program.
+    fn note_connection(&mut self, options: &SessionOptions) {
+        match &options.source {
+            DeviceSource::Can { interface } => self.recent.can_interface.clone_from(interface),
+            DeviceSource::Slcan { port, bit_rate } => {
+                self.recent.slcan = [port.clone(), bit_rate.to_string()];
+            }
+            DeviceSource::Replay { file } => self.recent.note_recording(file),
+            DeviceSource::Emulated => {}
+        }
+        if let Some(imu) = &options.imu {
+            self.recent.imu = [imu.port.clone(), imu.baud.to_string()];
+        }
+        self.save_recent();
+    }
+
+    fn disconnect(&mut self) {
+        self.link.close(&self.waker);
+        self.say("Disconnected.");
+        self.look_for_interfaces();
     }
 
     fn select_source(&mut self, source: Source) {
         if source == self.source {
             return;
         }
+        if self.link.is_hot() {
+            return self.fail("The robot may move: stop it before choosing another source.");
+        }
+        self.link.close(&self.waker);
+        self.link.forget();
+        self.robot.forget();
+        self.tune.reset_view();
+        if self.source == Source::Simulated {
+            self.paused_before = self.live.status.paused;
+            self.live.send(LiveCommand::Pause(true));
+        }
         self.source = source;
         self.set_live_interval();
-        match source {
-            Source::Simulated => {
-                self.live.send(LiveCommand::Pause(self.paused_before_can));
-                self.say("The plots show the simulated robot.");
-            }
-            Source::Can => {
-                self.paused_before_can = self.live.status.paused;
-                self.live.send(LiveCommand::Pause(true));
-                self.say("CAN is not connected; the simulated robot is paused.");
-            }
+        if source == Source::Simulated {
+            self.live.send(LiveCommand::Pause(self.paused_before));
+            self.say("The plots show the simulated robot.");
+        } else {
+            self.say("The simulated robot is paused. Nothing is connected yet: see the Robot tab.");
         }
+        self.look_for_interfaces();
     }
 
     fn restore_reference(&mut self) {
@@ -162,6 +228,7 @@ impl App {
         let name = self.model_path.as_deref().and_then(Path::file_name);
         let suggestion = match purpose {
             FilePurpose::SaveExperiment(saved_as) => self.experiments.suggested_name(saved_as),
+            FilePurpose::SaveRecording => self.robot.suggested_name(),
             _ => name.map_or_else(|| "model.toml".to_owned(), |name| name.to_string_lossy().into_owned()),
         };
         match Dialog::open(purpose, suggestion, &self.waker) {
@@ -182,6 +249,11 @@ impl App {
     }
 
     fn open_model(&mut self, model: Model, path: Option<PathBuf>) {
+        if self.link.is_hot() {
+            return self.fail("The robot may move: stop it before loading another model.");
+        }
+        // A robot is driven by the model that it was connected with, or not at all.
+        self.link.close(&self.waker);
         self.session = Session::new(model, self.session.controller);
         self.saved = self.session.clone();
         self.model_path = path;

@@ -1,9 +1,12 @@
 //! The frame around the pages: tabs, source, theme, status line, shortcuts.
 
-use egui::{Frame, Key, KeyboardShortcut, Margin, Modifiers, Panel, RichText, Theme, Ui};
+use egui::{Event, Frame, Key, KeyboardShortcut, Margin, Modifiers, Panel, RichText, Theme, Ui};
+
+use flqr_core::device::SessionOrder;
 
 use super::{App, Tab};
 use crate::command::{Command, FilePurpose, Source};
+use crate::robot::bar_ui;
 use crate::theme::palette;
 use crate::widgets::choice_ui;
 
@@ -13,14 +16,15 @@ const fn ctrl(key: Key) -> KeyboardShortcut {
 
 /// Keys and what they do; shown in the help menu.
 const HELP: &[(&str, &str)] = &[
-    ("Ctrl+1, Ctrl+2, Ctrl+3", "tune, friction, experiments"),
+    ("Esc, Space", "STOP a robot that is checked or driven: no torque, motors off"),
+    ("Ctrl+1 … Ctrl+4", "tune, friction, experiments, robot"),
     ("Ctrl+O", "open a model or a log"),
     ("Ctrl+S", "save the model"),
     ("Ctrl+E", "go to the first weight"),
     ("Ctrl+L", "go to the path of the log, or of what an experiment is saved to"),
-    ("Ctrl+Enter", "start or cancel the fit or the experiment"),
+    ("Ctrl+Enter", "start or cancel the fit or the experiment; connect or disconnect the robot"),
     ("Space, ←, →", "play, step (with Shift or Alt: longer, shorter) an experiment"),
-    ("Ctrl+P", "pause or run the simulated robot"),
+    ("Ctrl+P", "pause or run the simulated robot or the replay"),
     ("Ctrl+D", "light or dark"),
     ("Tab, Shift+Tab", "next, previous control"),
     ("drag, wheel, double click", "move, zoom, follow again (plots)"),
@@ -31,11 +35,21 @@ impl App {
         self.shortcuts(ui);
         let bar = Frame::side_top_panel(ui.style()).inner_margin(Margin::symmetric(10, 5));
         Panel::top("head").frame(bar).show(ui, |ui| self.head_ui(ui));
+        if self.source != Source::Simulated {
+            let (link, source, commands) = (&self.link, self.source, &self.commands);
+            let strip = Panel::top("robot strip").frame(bar);
+            if strip.show(ui, |ui| bar_ui(link, source, commands, ui)).inner {
+                self.link.stop();
+            }
+        }
         Panel::bottom("status").frame(bar).show(ui, |ui| self.status_ui(ui));
         self.page_ui(ui);
     }
 
     fn shortcuts(&mut self, ui: &Ui) {
+        if self.link.is_hot() && take_stop_keys(ui) {
+            self.link.stop();
+        }
         let pressed = |key| ui.input_mut(|input| input.consume_shortcut(&ctrl(key)));
         let send = |command| self.commands.send(command);
         if pressed(Key::Num1) {
@@ -47,8 +61,13 @@ impl App {
         if pressed(Key::Num3) {
             send(Command::SelectTab(Tab::Experiments));
         }
+        if pressed(Key::Num4) {
+            send(Command::SelectTab(Tab::Robot));
+        }
         if pressed(Key::O) {
             send(Command::ShowDialog(match self.tab {
+                Tab::Robot if self.source == Source::Replay => FilePurpose::OpenReplay,
+                Tab::Robot => FilePurpose::OpenModel,
                 Tab::Tune | Tab::Experiments => FilePurpose::OpenModel,
                 Tab::Friction => FilePurpose::OpenLog,
             }));
@@ -59,8 +78,12 @@ impl App {
                 None => Command::ShowDialog(FilePurpose::SaveModel),
             });
         }
-        if pressed(Key::P) && self.source == Source::Simulated {
-            send(Command::SetPaused(!self.live.status.paused));
+        if pressed(Key::P) {
+            match self.source {
+                Source::Simulated => send(Command::SetPaused(!self.live.status.paused)),
+                Source::Replay => send(Command::Order(SessionOrder::Pause(!self.link.replay_is_paused))),
+                Source::Emulated | Source::Can | Source::Slcan => {}
+            }
         }
         if pressed(Key::Enter) {
             match self.tab {
@@ -69,6 +92,8 @@ impl App {
                 Tab::Friction => send(Command::StartFit),
                 Tab::Experiments if self.experiments.is_running() => send(Command::CancelExperiment),
                 Tab::Experiments => send(Command::StartExperiment),
+                Tab::Robot if self.link.options().is_some() => send(Command::Disconnect),
+                Tab::Robot => send(Command::Connect),
             }
         }
         if pressed(Key::D) {
@@ -99,27 +124,37 @@ impl App {
                     "Experiments",
                     "LQR and FLQR side by side on the simulated robot (Ctrl+3)",
                 ),
+                (Tab::Robot, "Robot", "Connection, health, arming and recording of a robot (Ctrl+4)"),
             ];
             ui.scope(|ui| {
-                ui.spacing_mut().button_padding.x = 14.0;
+                ui.spacing_mut().button_padding.x = 12.0;
                 if choice_ui(ui, &mut tab, &tabs) {
                     self.commands.send(Command::SelectTab(tab));
                 }
             });
             ui.separator();
-            self.model_name_ui(ui);
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                 help_ui(ui);
                 theme_ui(ui);
                 ui.separator();
                 self.source_ui(ui);
+                ui.separator();
+                let name = egui::Layout::left_to_right(egui::Align::Center);
+                ui.with_layout(name, |ui| self.model_name_ui(ui));
             });
         });
     }
 
     fn model_name_ui(&self, ui: &mut Ui) {
-        ui.label(RichText::new(&self.session.name).strong());
-        if self.session != self.saved {
+        let changed = self.session != self.saved;
+        // The mark keeps its room whatever the length of the name.
+        let room = ui.available_width() - if changed { 66.0 } else { 0.0 };
+        ui.scope(|ui| {
+            ui.set_max_width(room.max(0.0));
+            let name = RichText::new(&self.session.name).strong();
+            ui.add(egui::Label::new(name).truncate());
+        });
+        if changed {
             let color = palette(ui.visuals()).warning;
             ui.label(RichText::new("changed").small().color(color))
                 .on_hover_text("The model differs from its file. Ctrl+S saves it.");
@@ -129,10 +164,8 @@ impl App {
     fn source_ui(&self, ui: &mut Ui) {
         let mut source = self.source;
         // Drawn from the right, so the last comes first.
-        let choices = [
-            (Source::Can, "CAN", "A real robot on a CAN bus"),
-            (Source::Simulated, "simulated", "The simulated robot"),
-        ];
+        let mut choices = Source::ALL;
+        choices.reverse();
         ui.scope(|ui| {
             if choice_ui(ui, &mut source, &choices) {
                 self.commands.send(Command::SelectSource(source));
@@ -164,22 +197,58 @@ impl App {
                 .on_hover_text("Time that the last frame took, drawing by the graphics driver included");
             ui.separator();
         }
-        let live = &self.live.status;
-        let state = match self.source {
-            Source::Can => "CAN: no link",
-            Source::Simulated if self.session.robot().is_none() => "no robot",
-            Source::Simulated if self.designer.in_force.is_none() => "no design, nothing runs",
-            Source::Simulated if live.fell => "simulated: fallen",
-            Source::Simulated if live.paused => "simulated: paused",
-            Source::Simulated => "simulated: 1000 Hz",
-        };
-        let losses = format!("late {:.1} s   lost {}", live.late_s, live.lost_samples);
-        ui.label(RichText::new(losses).small().monospace().weak()).on_hover_text(
-            "Simulated time that was skipped because the machine was too slow, and samples that the plots missed",
-        );
+        let (state, losses, help) = self.source_text();
+        ui.label(RichText::new(losses).small().monospace().weak()).on_hover_text(help);
         ui.separator();
         ui.label(RichText::new(state).small());
     }
+
+    /// How the source stands, what was lost of it, and what that means.
+    fn source_text(&self) -> (String, String, &'static str) {
+        if self.source != Source::Simulated {
+            let state = if self.link.is_open() { "connected" } else { "disconnected" };
+            let counters = self.link.status.as_ref().map(|status| status.counters).unwrap_or_default();
+            return (
+                format!("{}: {state}", self.source.name()),
+                format!("late {}   lost {}   dropped {}", counters.late, counters.lost, counters.dropped),
+                "Readings that came after their tick, frames that did not reach the window or the recording, and frames dropped by the system or the adapter",
+            );
+        }
+        let live = &self.live.status;
+        let state = if self.session.robot().is_none() {
+            "no robot"
+        } else if self.designer.in_force.is_none() {
+            "no design, nothing runs"
+        } else if live.fell {
+            "simulated: fallen"
+        } else if live.paused {
+            "simulated: paused"
+        } else {
+            "simulated: 1000 Hz"
+        };
+        (
+            state.to_owned(),
+            format!("late {:.1} s   lost {}", live.late_s, live.lost_samples),
+            "Simulated time that was skipped because the machine was too slow, and samples that the plots missed",
+        )
+    }
+}
+
+/// Takes Esc and Space away from whatever has the focus, and says whether one was pressed.
+fn take_stop_keys(ui: &Ui) -> bool {
+    ui.input_mut(|input| {
+        let mut stop = false;
+        input.events.retain(|event| {
+            let (taken, pressed) = match event {
+                Event::Key { key: Key::Escape | Key::Space, pressed, .. } => (true, *pressed),
+                Event::Text(text) => (text == " ", text == " "),
+                _ => (false, false),
+            };
+            stop |= pressed;
+            !taken
+        });
+        stop
+    })
 }
 
 fn theme_ui(ui: &mut Ui) {

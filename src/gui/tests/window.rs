@@ -125,7 +125,7 @@ fn can_is_honest_about_being_not_connected() {
     let mut window = open(WindowOptions { paused: false, ..options(Tab::Tune) }, SIZE);
     click(&mut window, "CAN");
     window.get_by_label("CAN: not connected");
-    window.get_by_label_contains("This version has no CAN link yet");
+    window.get_by_label_contains("until a robot is connected on the Robot tab");
     let state = state(&window);
     assert_eq!((&state["source"], &state["simulation"]["paused"]), (&"can".into(), &true.into()));
     assert!(window.query_by_label("Push").is_none(), "no controls of the simulated robot");
@@ -486,7 +486,7 @@ fn gaps_are_drawn_zoomed_out_and_in() {
 
 #[test]
 fn every_page_survives_any_size() {
-    for tab in [Tab::Tune, Tab::Friction, Tab::Experiments] {
+    for tab in [Tab::Tune, Tab::Friction, Tab::Experiments, Tab::Robot] {
         for size in [Vec2::ZERO, vec2(1.0, 1.0), vec2(300.0, 200.0), vec2(1920.0, 1080.0)] {
             open(options(tab), size).run_steps(3);
         }
@@ -495,7 +495,7 @@ fn every_page_survives_any_size() {
 
 #[test]
 fn a_hundred_frames_of_random_input_do_no_harm() {
-    for (tab, seed) in [(Tab::Tune, 1), (Tab::Friction, 2)] {
+    for (tab, seed) in [(Tab::Tune, 1), (Tab::Friction, 2), (Tab::Robot, 4)] {
         random_input(&mut open(WindowOptions { paused: false, ..options(tab) }, SIZE), seed);
     }
 }

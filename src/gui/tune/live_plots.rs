@@ -3,17 +3,18 @@
 use std::time::Duration;
 
 use egui::{ComboBox, RichText, Ui};
+use flqr_core::device::SessionOrder;
 
-use crate::command::Command;
+use crate::command::{Command, Source};
 use crate::context::ViewContext;
 use crate::history::{Channel, HISTORY_S};
 use crate::plot::{Curve, DecimationCache, RangeStatistics, TimeCurve, TimePlot, TimeView};
 use crate::quantity::{Quantity, to_scale};
 use crate::theme::palette;
-use crate::widgets::{choice_ui, error_ui, mono, number_ui, warning_ui};
+use crate::widgets::{choice_ui, error_ui, hint_ui, mono, number_ui, warning_ui};
 
-/// Longer steps in time are drawn as gaps, s.
-const GAP_S: f64 = 0.02;
+/// Longer steps in time are drawn as gaps, s: of the simulated robot, and of a real one.
+const GAP_S: [f64; 2] = [0.02, 0.1];
 /// Room for the statistics at the right of each plot.
 const STATISTICS_WIDTH: f32 = 118.0;
 /// Height of the time axis with its label.
@@ -50,23 +51,23 @@ impl LivePlots {
 
     pub(super) fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
         ui.horizontal_wrapped(|ui| {
-            run_ui(context, ui);
-            ui.separator();
-            self.push_ui(context, ui);
-            ui.separator();
+            match context.source {
+                Source::Simulated => run_ui(context, ui),
+                Source::Replay => replay_ui(context, ui),
+                Source::Emulated | Source::Can | Source::Slcan => {}
+            }
+            if matches!(context.source, Source::Simulated | Source::Emulated) {
+                self.push_ui(context, ui);
+            }
             self.view_ui(context, ui);
         });
-        if context.live.fell {
-            warning_ui(
+        if context.source == Source::Simulated {
+            simulated_ui(context, ui);
+        } else if context.history.time_s().is_empty() {
+            hint_ui(
                 ui,
-                "The robot fell (pitch beyond 0.8 rad) and is stopped. Reset puts it upright again.",
+                "No row of displacement, velocity and pitch has come yet: they need both motors and the IMU.",
             );
-        }
-        if context.designer.in_force.is_none() {
-            error_ui(ui, "There is no design, so nothing runs: weights that give one start the robot.");
-        }
-        if let Some(problem) = &context.live.problem {
-            error_ui(ui, format!("The simulated robot did not take the change: {problem}."));
         }
         self.plots_ui(context, ui);
     }
@@ -74,7 +75,11 @@ impl LivePlots {
     fn push_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
         let push = ui.button("Push").on_hover_text("Push the body forward at its centre of mass");
         if push.clicked() {
-            context.commands.send(Command::Push { force_n: self.push_n, duration_s: self.push_s });
+            let (force_n, duration_s) = (self.push_n, self.push_s);
+            context.commands.send(match context.source {
+                Source::Simulated => Command::Push { force_n, duration_s },
+                _ => Command::Order(SessionOrder::Push { force_n, duration_s }),
+            });
         }
         number_ui(ui, &mut self.push_n, "push force", 40.0)
             .on_hover_text("Force of the push; negative: backward");
@@ -82,6 +87,7 @@ impl LivePlots {
         number_ui(ui, &mut self.push_s, "push duration", 40.0).on_hover_text("Duration of the push");
         self.push_s = self.push_s.clamp(0.001, 10.0);
         ui.label("s");
+        ui.separator();
     }
 
     fn view_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
@@ -122,6 +128,7 @@ impl LivePlots {
         let end = history.end_s();
         let start = history.time_s().first().copied().unwrap_or(0.0).max(end - HISTORY_S);
         self.view.update([start, end]);
+        let gap = GAP_S[usize::from(context.source != Source::Simulated)];
         let spacing = ui.spacing().item_spacing.y;
         let height = ((ui.available_height() - TIME_AXIS_HEIGHT - 3.0 * spacing) / 3.0).max(30.0);
         let colors = palette(ui.visuals()).channels;
@@ -136,7 +143,7 @@ impl LivePlots {
                 min_y_span: quantity.min_span,
             };
             let curve =
-                Curve { x: history.time_s(), y: history.channel(channel), scale: quantity.scale, gap: GAP_S };
+                Curve { x: history.time_s(), y: history.channel(channel), scale: quantity.scale, gap };
             let (view, cache) = (&mut self.view, &mut self.caches[index]);
             let (color, generation) = (colors[index], history.generation());
             ui.horizontal_top(|ui| {
@@ -166,6 +173,31 @@ fn run_ui(context: &ViewContext<'_>, ui: &mut Ui) {
     if ui.button("Reset").on_hover_text("Put the robot at the start and clear the plots").clicked() {
         context.commands.send(Command::ResetSimulation);
     }
+    ui.separator();
+}
+
+/// Why the simulated robot does not run, if so.
+fn simulated_ui(context: &ViewContext<'_>, ui: &mut Ui) {
+    if context.live.fell {
+        warning_ui(ui, "The robot fell (pitch beyond 0.8 rad) and is stopped. Reset puts it upright again.");
+    }
+    if context.designer.in_force.is_none() {
+        error_ui(ui, "There is no design, so nothing runs: weights that give one start the robot.");
+    }
+    if let Some(problem) = &context.live.problem {
+        error_ui(ui, format!("The simulated robot did not take the change: {problem}."));
+    }
+}
+
+fn replay_ui(context: &ViewContext<'_>, ui: &mut Ui) {
+    let paused = context.link.replay_is_paused;
+    let (name, help) =
+        if paused { ("Run", "Let the replay go on (Ctrl+P)") } else { ("Pause", "Hold the replay (Ctrl+P)") };
+    let button = ui.add(egui::Button::new(name).min_size(egui::vec2(52.0, 0.0))).on_hover_text(help);
+    if button.clicked() {
+        context.commands.send(Command::Order(SessionOrder::Pause(!paused)));
+    }
+    ui.separator();
 }
 
 /// What a reader of the plot would measure, as text (for screen readers too).

@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 
 use egui::{CentralPanel, Frame, Margin, Panel, ScrollArea, Ui};
 
+use crate::app::Tab;
 use crate::command::{Command, FilePurpose, Source};
 use crate::context::ViewContext;
 use crate::session::Session;
@@ -113,10 +114,13 @@ impl TuneTab {
             .default_size(206.0)
             .size_range(120.0..=420.0)
             .show(ui, |ui| self.predicted.ui(context, ui));
-        CentralPanel::default().frame(bottom).show(ui, |ui| match context.source {
-            Source::Simulated => self.plots.ui(context, ui),
-            Source::Can => not_connected_ui(context, ui),
-        });
+        // What a session has brought stays in view after its end.
+        let shown = context.source == Source::Simulated
+            || context.link.is_open()
+            || !context.history.time_s().is_empty();
+        CentralPanel::default()
+            .frame(bottom)
+            .show(ui, |ui| if shown { self.plots.ui(context, ui) } else { not_connected_ui(context, ui) });
     }
 }
 
@@ -134,12 +138,15 @@ fn no_robot_ui(context: &ViewContext<'_>, ui: &mut Ui) {
 }
 
 fn not_connected_ui(context: &ViewContext<'_>, ui: &mut Ui) {
-    ui.add_space(80.0);
+    ui.add_space(0.3 * ui.available_height());
     ui.vertical_centered(|ui| {
-        ui.heading("CAN: not connected");
-        hint_ui(ui, "This version has no CAN link yet, so there is nothing measured to show here.");
+        ui.heading(format!("{}: not connected", context.source.name()));
+        hint_ui(ui, "There is nothing measured to show here until a robot is connected on the Robot tab.");
         hint_ui(ui, "The simulated robot is paused and is not shown as if it were the real one.");
         ui.add_space(8.0);
+        if ui.button("Connect on the Robot tab").clicked() {
+            context.commands.send(Command::SelectTab(Tab::Robot));
+        }
         if ui.button("Back to the simulated robot").clicked() {
             context.commands.send(Command::SelectSource(Source::Simulated));
         }

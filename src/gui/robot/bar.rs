@@ -1,0 +1,174 @@
+//! The strip under the tabs while a robot is the source: stage, connection, rates, recording, and the way out.
+
+use egui::{Align, Button, Color32, Frame, Label, Layout, Margin, Response, RichText, Ui, vec2};
+use flqr_core::control::drive::{Stage, StopReason};
+use flqr_core::device::{Connection, SessionOrder};
+
+use super::link::{Link, sentence};
+use crate::app::Tab;
+use crate::command::{Command, Commands, Source};
+use crate::context::ViewContext;
+use crate::theme::palette;
+use crate::widgets::plain;
+
+/// Fill of the button that stops the robot, in both themes.
+const STOP_FILL: Color32 = Color32::from_rgb(196, 32, 28);
+
+const STOP_HEIGHT: f32 = 30.0;
+
+/// The strip; says whether STOP was pressed.
+pub(crate) fn bar_ui(link: &Link, source: Source, commands: &Commands, ui: &mut Ui) -> bool {
+    ui.horizontal(|ui| {
+        ui.set_height(STOP_HEIGHT);
+        chip_ui(link, ui);
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            let stop = link.may_drive() && stop_ui(ui, vec2(150.0, STOP_HEIGHT)).clicked();
+            recording_ui(link, ui);
+            rates_ui(link, ui);
+            ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+                text_ui(link, source, commands, ui);
+            });
+            stop
+        })
+        .inner
+    })
+    .inner
+}
+
+/// The button that takes torque and power off.
+pub(super) fn stop_ui(ui: &mut Ui, size: egui::Vec2) -> Response {
+    let text = RichText::new("STOP   Esc, Space").strong().color(Color32::WHITE);
+    let button = Button::new(text).fill(STOP_FILL).min_size(size);
+    ui.add(button).accessible_name("STOP").on_hover_text("No torque, motors off, at once (Esc or Space)")
+}
+
+/// Name of a stage, for people.
+pub(super) fn stage_name(stage: Option<Stage>) -> &'static str {
+    match stage {
+        None => "Disconnected",
+        Some(Stage::Listening) => "Listening",
+        Some(Stage::Checking) => "Checking",
+        Some(Stage::Driving) => "Driving",
+        Some(Stage::Stopped(_)) => "Stopped",
+    }
+}
+
+fn chip_ui(link: &Link, ui: &mut Ui) {
+    let colors = palette(ui.visuals());
+    let stage = link.stage();
+    let (fill, text) = match stage {
+        None => (ui.visuals().widgets.inactive.bg_fill, ui.visuals().text_color()),
+        Some(Stage::Listening) => (colors.accent, ui.visuals().extreme_bg_color),
+        Some(Stage::Checking) => (colors.warning, ui.visuals().extreme_bg_color),
+        Some(Stage::Driving) => (colors.good, ui.visuals().extreme_bg_color),
+        Some(Stage::Stopped(_)) => (colors.error, ui.visuals().extreme_bg_color),
+    };
+    Frame::new().fill(fill).corner_radius(10).inner_margin(Margin::symmetric(12, 4)).show(ui, |ui| {
+        ui.add(Label::new(RichText::new(stage_name(stage)).strong().color(text)).selectable(false));
+    });
+}
+
+fn text_ui(link: &Link, source: Source, commands: &Commands, ui: &mut Ui) {
+    let colors = palette(ui.visuals());
+    let Some(options) = link.options() else {
+        if ui.button("Go to connection").on_hover_text("The Robot tab (Ctrl+4)").clicked() {
+            commands.send(Command::SelectTab(Tab::Robot));
+        }
+        ui.weak(format!("{}: nothing is connected", source.name()));
+        return;
+    };
+    ui.label(RichText::new(options.source.to_string()).monospace());
+    if let Some(Stage::Stopped(reason)) = link.stage() {
+        ui.add(Label::new(RichText::new(stopped(&reason)).strong().color(colors.error)).truncate());
+        return;
+    }
+    let (text, good) = connection_text(link);
+    let text = RichText::new(text);
+    ui.add(Label::new(if good { text } else { text.strong().color(colors.warning) }).truncate());
+}
+
+/// Why, and the mend, in a sentence.
+pub(super) fn stopped(reason: &StopReason) -> String {
+    let text = sentence(&reason.to_string());
+    mend(reason).map_or_else(|| text.clone(), |mend| format!("{text} {mend}"))
+}
+
+/// The mend, where the reason itself does not say it.
+fn mend(reason: &StopReason) -> Option<&'static str> {
+    Some(match reason {
+        StopReason::Asked => "Release it to arm again.",
+        StopReason::Done => "Its recording can be fitted on the Friction tab.",
+        StopReason::Tilt { .. } => {
+            "Stand it upright; look at the signs of IMU and motors if it fell at once."
+        }
+        StopReason::Speed { .. } | StopReason::Distance { .. } => {
+            "Put it back; raise the limit under [safety] of the model if it has the room."
+        }
+        StopReason::MotorSpeed { .. } => {
+            "Put the wheels on the ground, or raise motor_speed_rad_s under [safety]."
+        }
+        StopReason::MotorError { .. } => "Take the cause away, then switch the motor off and on.",
+        StopReason::NotFinite => "Look at the raw frames and at the scales under [link] of the model.",
+        _ => return None,
+    })
+}
+
+/// How the connection stands, and whether that is as it should be.
+pub(super) fn connection_text(link: &Link) -> (String, bool) {
+    let Some(status) = &link.status else {
+        let text = if link.is_opening() { "connecting…" } else { "open, waiting for the first readings" };
+        return (text.to_owned(), true);
+    };
+    match &status.connection {
+        Connection::Connected if !link.may_drive() && !link.is_replay() => {
+            ("connected; listening only, nothing is sent".to_owned(), true)
+        }
+        Connection::Connected if link.is_replay() && link.replay_is_paused => ("paused".to_owned(), true),
+        Connection::Connected if link.is_replay() => ("playing".to_owned(), true),
+        Connection::Connected if link.stage() == Some(Stage::Listening) => {
+            ("connected; not armed, nothing is sent".to_owned(), true)
+        }
+        Connection::Connected => ("connected".to_owned(), true),
+        Connection::Silent { hint } => (format!("silent: {hint}"), false),
+        Connection::Lost { reason } => (format!("lost, trying again: {reason}"), false),
+        Connection::Ended => ("the recording has come to its end".to_owned(), true),
+    }
+}
+
+fn rates_ui(link: &Link, ui: &mut Ui) {
+    let Some(status) = link.status.as_ref().filter(|_| link.is_open()) else { return };
+    let text = format!("{:>4} rows/s {:>5.0} frames/s", link.rows_hz(), status.counters.received_hz);
+    ui.label(RichText::new(text).small().monospace().weak())
+        .on_hover_text("Rows of the robot log and frames from the bus over the last second");
+}
+
+fn recording_ui(link: &Link, ui: &mut Ui) {
+    let status = link.status.as_ref().filter(|_| link.is_open());
+    let Some(recording) = status.and_then(|status| status.recording.as_ref()) else { return };
+    let colors = palette(ui.visuals());
+    let (text, color) = match &recording.problem {
+        Some(_) => ("REC failed", colors.warning),
+        None => ("REC", colors.error),
+    };
+    let help = recording.problem.clone().unwrap_or_else(|| recording.file.display().to_string());
+    ui.label(RichText::new(text).strong().color(color)).on_hover_text(help);
+}
+
+/// What a session can be told while it replays.
+pub(super) fn replay_ui(context: &ViewContext<'_>, speed: &mut f64, ui: &mut Ui) {
+    let paused = context.link.replay_is_paused;
+    ui.horizontal(|ui| {
+        let (name, help) = if paused {
+            ("Run", "Let the replay go on (Ctrl+P)")
+        } else {
+            ("Pause", "Hold the replay (Ctrl+P)")
+        };
+        if ui.add(Button::new(name).min_size(vec2(56.0, 0.0))).on_hover_text(help).clicked() {
+            context.commands.send(Command::Order(SessionOrder::Pause(!paused)));
+        }
+        if super::form::speed_ui(speed, ui) {
+            context.commands.send(Command::Order(SessionOrder::ReplaySpeed(*speed)));
+        }
+        ui.weak(format!("of real time: {} ×", plain(*speed, 2)));
+    });
+}

@@ -1,0 +1,310 @@
+//! The newest raw frames, with a filter. What passes it is kept apart, so that drawing costs what is visible.
+
+use std::collections::VecDeque;
+use std::fmt::Write;
+
+use egui::{Label, RichText, ScrollArea, TextEdit, Ui};
+use flqr_core::link::{Direction, FrameId, FrameKind, StampedFrame};
+
+use crate::widgets::{choice_ui, hint_ui, mono, section_ui};
+
+/// Frames that are kept, before and after the filter.
+const KEPT: usize = 2000;
+
+/// Which way frames went that are shown.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Way {
+    #[default]
+    Both,
+    Received,
+    Sent,
+}
+
+/// Which frames are shown.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Filter {
+    ids: String,
+    text: String,
+    way: Way,
+}
+
+/// A filter that has been read.
+#[derive(Clone, Debug, Default)]
+struct Test {
+    /// Any of these; all where there are none.
+    ids: Vec<u32>,
+    /// In the bytes as hexadecimal digits without spaces, or in the meaning, in small letters.
+    text: String,
+    way: Way,
+}
+
+impl Filter {
+    fn read(&self) -> Result<Test, String> {
+        let words = self.ids.split([',', ';', ' ']).filter(|word| !word.is_empty());
+        let id = |word: &str| {
+            let digits = word.trim_start_matches("0x").trim_start_matches("0X");
+            u32::from_str_radix(digits, 16)
+                .map_err(|_| format!("{word:?} is no identifier: give hexadecimal ones, as 141"))
+        };
+        let ids = words.map(id).collect::<Result<_, _>>()?;
+        let text = self.text.trim().to_lowercase();
+        let is_hex = text.chars().all(|letter| letter.is_ascii_hexdigit() || letter == ' ');
+        Ok(Test { ids, text: if is_hex { text.replace(' ', "") } else { text }, way: self.way })
+    }
+}
+
+impl Test {
+    fn passes(&self, stamped: &StampedFrame, buffer: &mut String) -> bool {
+        let way = match self.way {
+            Way::Both => true,
+            Way::Received => stamped.direction == Direction::Received,
+            Way::Sent => stamped.direction == Direction::Sent,
+        };
+        if !way || !(self.ids.is_empty() || self.ids.contains(&stamped.frame.id().raw())) {
+            return false;
+        }
+        if self.text.is_empty() {
+            return true;
+        }
+        buffer.clear();
+        for byte in stamped.frame.bytes() {
+            push(buffer, format_args!("{byte:02x}"));
+        }
+        buffer.contains(&self.text)
+            || meaning(stamped).is_some_and(|text| text.to_lowercase().contains(&self.text))
+    }
+}
+
+/// The table.
+#[derive(Default)]
+pub(crate) struct FrameTable {
+    all: VecDeque<StampedFrame>,
+    shown: VecDeque<StampedFrame>,
+    filter: Filter,
+    test: Test,
+    problem: Option<String>,
+    held: bool,
+    buffer: String,
+}
+
+impl FrameTable {
+    /// Takes frames in, unless the table is held.
+    pub(super) fn extend(&mut self, frames: &[StampedFrame]) {
+        if self.held {
+            return;
+        }
+        for frame in frames {
+            keep(&mut self.all, *frame);
+            if self.test.passes(frame, &mut self.buffer) {
+                keep(&mut self.shown, *frame);
+            }
+        }
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.all.clear();
+        self.shown.clear();
+    }
+
+    /// Frames that pass the filter.
+    pub(super) fn shown(&self) -> usize {
+        self.shown.len()
+    }
+
+    fn refilter(&mut self) {
+        match self.filter.read() {
+            Ok(test) => (self.test, self.problem) = (test, None),
+            Err(problem) => return self.problem = Some(problem),
+        }
+        self.shown.clear();
+        self.shown.extend(self.all.iter().filter(|frame| self.test.passes(frame, &mut self.buffer)));
+    }
+
+    pub(super) fn ui(&mut self, ui: &mut Ui) {
+        section_ui(ui, "Raw frames", |ui| {
+            ui.toggle_value(&mut self.held, "Hold")
+                .on_hover_text("Keep these frames in view; nothing else stops");
+            let count = format!("{} of {}", self.shown.len(), self.all.len());
+            ui.label(RichText::new(count).small().weak())
+                .on_hover_text(format!("Frames that pass the filter, of the newest {KEPT}"));
+        });
+        let before = self.filter.clone();
+        self.filter_ui(ui);
+        if self.filter != before {
+            self.refilter();
+        }
+        if let Some(problem) = &self.problem {
+            crate::widgets::error_ui(ui, problem);
+        }
+        self.rows_ui(ui);
+    }
+
+    fn filter_ui(&mut self, ui: &mut Ui) {
+        ui.horizontal(|ui| {
+            ui.label("id");
+            let field = TextEdit::singleline(&mut self.filter.ids).hint_text("all").desired_width(84.0);
+            ui.add(field)
+                .accessible_name("identifiers to show")
+                .on_hover_text("Hexadecimal identifiers, several separated by spaces: 141 142");
+            ui.label("bytes or text");
+            let field = TextEdit::singleline(&mut self.filter.text).hint_text("any").desired_width(110.0);
+            ui.add(field)
+                .accessible_name("bytes or text to show")
+                .on_hover_text("Hexadecimal bytes (9C 20), or a word of the meaning");
+            ui.scope(|ui| {
+                let choices = [
+                    (Way::Both, "all", "Both directions"),
+                    (Way::Received, "rx", "Received from the bus"),
+                    (Way::Sent, "tx", "Sent by this program"),
+                ];
+                choice_ui(ui, &mut self.filter.way, &choices);
+            });
+        });
+    }
+
+    fn rows_ui(&self, ui: &mut Ui) {
+        let head = format!("{:>11}  {:2}  {:>8}  {:1}  {:23}  meaning", "time [s]", "", "id", "n", "bytes");
+        ui.add(Label::new(mono(head).weak()).truncate());
+        if self.shown.is_empty() {
+            let text = if self.all.is_empty() { "No frame yet." } else { "No frame passes the filter." };
+            hint_ui(ui, text);
+        }
+        ui.spacing_mut().item_spacing.y = 1.0;
+        let height = ui.text_style_height(&egui::TextStyle::Monospace);
+        let area = ScrollArea::vertical().id_salt("frames").auto_shrink(false);
+        area.show_rows(ui, height, self.shown.len(), |ui, rows| {
+            for row in rows {
+                // The newest comes first.
+                let Some(frame) = self.shown.iter().rev().nth(row) else { continue };
+                ui.add(Label::new(mono(line(frame))).truncate());
+            }
+        });
+    }
+}
+
+fn keep(frames: &mut VecDeque<StampedFrame>, frame: StampedFrame) {
+    if frames.len() == KEPT {
+        frames.pop_front();
+    }
+    frames.push_back(frame);
+}
+
+fn line(stamped: &StampedFrame) -> String {
+    let frame = &stamped.frame;
+    let way = if stamped.direction == Direction::Sent { "tx" } else { "rx" };
+    let id = match frame.id() {
+        FrameId::Standard(id) => format!("{id:03X}"),
+        FrameId::Extended(id) => format!("{id:08X}"),
+    };
+    let mut text = format!("{:>11.4}  {way}  {id:>8}  {}  ", stamped.time.as_secs_f64(), frame.length());
+    let start = text.len();
+    for byte in frame.bytes() {
+        push(&mut text, format_args!("{byte:02X} "));
+    }
+    while text.len() < start + 25 {
+        text.push(' ');
+    }
+    match frame.kind() {
+        FrameKind::Data => text.push_str(&meaning(stamped).unwrap_or_default()),
+        FrameKind::Remote => text.push_str("remote request"),
+        FrameKind::Error => text.push_str("error frame"),
+    }
+    text
+}
+
+/// What the bytes say, where that is known.
+fn meaning(_stamped: &StampedFrame) -> Option<String> {
+    None
+}
+
+fn push(text: &mut String, part: std::fmt::Arguments<'_>) {
+    text.write_fmt(part).expect("a string takes all that is written to it");
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use flqr_core::link::Frame;
+
+    use super::*;
+
+    fn table() -> FrameTable {
+        let mut table = FrameTable::default();
+        let frames: Vec<StampedFrame> = (0..3000_u32)
+            .map(|number| {
+                let id = FrameId::Standard(if number % 3 == 0 { 0x141 } else { 0x142 });
+                let direction = if number % 2 == 0 { Direction::Sent } else { Direction::Received };
+                let bytes = [0x9C, (number % 256) as u8, 0, 0, 0, 0, 0, 0];
+                StampedFrame {
+                    time: Duration::from_millis(number.into()),
+                    direction,
+                    frame: Frame::full(id, bytes),
+                }
+            })
+            .collect();
+        table.extend(&frames);
+        table
+    }
+
+    #[test]
+    fn the_table_is_bounded_and_keeps_the_newest() {
+        let table = table();
+        assert_eq!((table.all.len(), table.shown.len()), (KEPT, KEPT));
+        assert_eq!(table.shown.back().unwrap().time, Duration::from_millis(2999));
+    }
+
+    #[test]
+    fn a_filter_takes_identifiers_bytes_and_directions() {
+        for (ids, text, way, expected) in [
+            ("141", "", Way::Both, 666),
+            ("0x141, 142", "", Way::Both, 2000),
+            ("7FF", "", Way::Both, 0),
+            ("", "9c ff", Way::Both, 8),
+            ("", "9CFF", Way::Both, 8),
+            ("", "", Way::Sent, 1000),
+            ("141", "9c fe", Way::Sent, 3),
+        ] {
+            let mut table = table();
+            table.filter = Filter { ids: ids.to_owned(), text: text.to_owned(), way };
+            table.refilter();
+            assert_eq!(table.shown.len(), expected, "{ids:?} {text:?} {way:?}");
+        }
+    }
+
+    #[test]
+    fn a_filter_that_cannot_be_read_is_told_and_changes_nothing() {
+        let mut table = table();
+        table.filter.ids = "wheel".to_owned();
+        table.refilter();
+        assert!(table.problem.as_ref().unwrap().contains("wheel"));
+        assert_eq!(table.shown.len(), KEPT);
+    }
+
+    #[test]
+    fn a_held_table_takes_nothing_in() {
+        let mut table = table();
+        table.held = true;
+        let frame = *table.all.front().unwrap();
+        table.extend(&[frame]);
+        assert_ne!(table.all.back(), Some(&frame));
+    }
+
+    #[test]
+    fn a_line_has_its_columns_whatever_the_frame() {
+        let stamped =
+            |frame| StampedFrame { time: Duration::from_millis(1500), direction: Direction::Sent, frame };
+        for (frame, text) in [
+            (
+                Frame::data(FrameId::Standard(0x141), &[0x9C, 1]).unwrap(),
+                "     1.5000  tx       141  2  9C 01",
+            ),
+            (
+                Frame::remote(FrameId::Extended(0x1ABCDE), 8).unwrap(),
+                "     1.5000  tx  001ABCDE  8                           remote request",
+            ),
+        ] {
+            assert_eq!(line(&stamped(frame)).trim_end(), text);
+        }
+    }
+}

@@ -1,0 +1,252 @@
+//! The session with a robot: opened and closed on threads of their own, drained once a frame.
+
+use std::sync::Arc;
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use flqr_core::control::BalanceController;
+use flqr_core::control::drive::{CheckResult, DriveOrder, Stage};
+use flqr_core::device::{Connection, SessionMode, SessionOptions, SessionOrder, Source, Status, Update};
+
+use super::feed::{Devices, RobotFeed};
+use crate::history::History;
+use crate::job::{Job, Outcome, Waker};
+
+/// An update that comes sooner after an order may have been made before it.
+const ORDER_ROUND_TRIP: Duration = Duration::from_millis(300);
+
+type Opened = Result<Box<dyn RobotFeed>, String>;
+
+enum State {
+    Closed,
+    Opening(Job<(), Opened>),
+    Open(Box<dyn RobotFeed>),
+}
+
+/// The one session of the window.
+pub(crate) struct Link {
+    devices: Arc<dyn Devices>,
+    state: State,
+    /// What the session was opened with; of one that has been closed too.
+    options: Option<SessionOptions>,
+    closing: Option<JoinHandle<()>>,
+    /// When a step of arming was last asked for, until an update surely knows of it.
+    arming: Option<Instant>,
+    interval: Duration,
+    pub(crate) history: History,
+    pub(crate) status: Option<Status>,
+    pub(crate) rows: u64,
+    pub(crate) replay_is_paused: bool,
+    /// Why the last attempt to connect failed.
+    pub(crate) problem: Option<String>,
+}
+
+impl Link {
+    pub(crate) fn new(devices: Arc<dyn Devices>) -> Self {
+        Self {
+            devices,
+            state: State::Closed,
+            options: None,
+            closing: None,
+            arming: None,
+            interval: Duration::from_millis(33),
+            history: History::default(),
+            status: None,
+            rows: 0,
+            replay_is_paused: false,
+            problem: None,
+        }
+    }
+
+    pub(crate) fn devices(&self) -> &Arc<dyn Devices> {
+        &self.devices
+    }
+
+    pub(crate) fn is_open(&self) -> bool {
+        matches!(self.state, State::Open(_))
+    }
+
+    pub(crate) fn is_opening(&self) -> bool {
+        matches!(self.state, State::Opening(_))
+    }
+
+    /// Whether the session of before still lets go of its ports.
+    pub(crate) fn is_closing(&self) -> bool {
+        self.closing.as_ref().is_some_and(|thread| !thread.is_finished())
+    }
+
+    /// What the session is open, or opened, with.
+    pub(crate) fn options(&self) -> Option<&SessionOptions> {
+        self.options.as_ref().filter(|_| !matches!(self.state, State::Closed))
+    }
+
+    /// Whether the session may ever send anything.
+    pub(crate) fn may_drive(&self) -> bool {
+        self.options().is_some_and(|options| matches!(options.mode, SessionMode::Drive { .. }))
+    }
+
+    pub(crate) fn is_replay(&self) -> bool {
+        self.options().is_some_and(|options| matches!(options.source, Source::Replay { .. }))
+    }
+
+    /// How far the robot is from being driven; none without a session.
+    pub(crate) fn stage(&self) -> Option<Stage> {
+        if !self.is_open() {
+            return None;
+        }
+        let drive = self.status.as_ref().and_then(|status| status.drive.as_ref());
+        Some(drive.map_or(Stage::Listening, |drive| drive.stage))
+    }
+
+    /// Whether motors are asked for anything, or may be from one moment to the next.
+    pub(crate) fn is_hot(&self) -> bool {
+        self.may_drive()
+            && (self.arming.is_some() || matches!(self.stage(), Some(Stage::Checking | Stage::Driving)))
+    }
+
+    /// Whether the second step of arming may be taken.
+    pub(crate) fn may_arm(&self) -> bool {
+        let drive = self.status.as_ref().and_then(|status| status.drive.as_ref());
+        self.is_open()
+            && drive.is_some_and(|drive| {
+                drive.stage == Stage::Checking
+                    && !drive.checks.is_empty()
+                    && drive.checks.iter().all(|check| check.result == CheckResult::Passed)
+            })
+    }
+
+    /// Opens a session in place of the one there is.
+    pub(crate) fn open(&mut self, options: SessionOptions, waker: &Waker) {
+        self.close(waker);
+        self.forget();
+        self.options = Some(options.clone());
+        let (devices, wake, before) = (Arc::clone(&self.devices), Arc::clone(waker), self.closing.take());
+        let work = move |_: &_| {
+            // The port is free only when the session of before has let go of it; its panic was reported there.
+            before.map(|thread| thread.join().ok());
+            devices.open(options, wake)
+        };
+        match Job::start("open-session", waker, work) {
+            Ok(job) => self.state = State::Opening(job),
+            Err(error) => self.problem = Some(format!("No thread to connect: {error}.")),
+        }
+    }
+
+    /// Forgets what the last session has brought.
+    pub(crate) fn forget(&mut self) {
+        self.history.clear();
+        (self.status, self.rows, self.replay_is_paused, self.problem) = (None, 0, false, None);
+    }
+
+    /// Ends the session: no torque, motors off.
+    pub(crate) fn close(&mut self, waker: &Waker) {
+        self.arming = None;
+        let State::Open(mut feed) = std::mem::replace(&mut self.state, State::Closed) else { return };
+        feed.send(SessionOrder::Drive(DriveOrder::Stop));
+        let wake = Arc::clone(waker);
+        let ended = std::thread::Builder::new().name("close-session".to_owned()).spawn(move || {
+            drop(feed);
+            wake();
+        });
+        // Without a thread the session has ended right here, when the closure was dropped.
+        self.closing = ended.ok();
+    }
+
+    pub(crate) fn send(&mut self, order: SessionOrder) {
+        let State::Open(feed) = &mut self.state else { return };
+        match &order {
+            SessionOrder::Drive(DriveOrder::Check | DriveOrder::Arm) => self.arming = Some(Instant::now()),
+            SessionOrder::Pause(paused) => self.replay_is_paused = *paused,
+            _ => {}
+        }
+        feed.send(order);
+    }
+
+    /// No torque, motors off.
+    pub(crate) fn stop(&mut self) {
+        if self.may_drive() {
+            self.send(SessionOrder::Drive(DriveOrder::Stop));
+        }
+    }
+
+    /// Another controller for the robot.
+    pub(crate) fn set_controller(&mut self, controller: BalanceController) {
+        if self.may_drive() {
+            self.send(SessionOrder::Drive(DriveOrder::Controller(Box::new(controller))));
+        }
+    }
+
+    /// Time between two updates.
+    pub(crate) fn set_interval(&mut self, interval: Duration) {
+        self.interval = interval;
+        self.send(SessionOrder::Interval(interval));
+    }
+
+    /// What has come since the last call; a sentence if the session was opened or refused.
+    pub(crate) fn drain(&mut self) -> (Vec<Update>, Option<Result<String, String>>) {
+        let message = self.take_opened();
+        let State::Open(feed) = &mut self.state else { return (Vec::new(), message) };
+        let updates = feed.poll();
+        for update in &updates {
+            self.rows += update.samples.len() as u64;
+            self.history.extend(&update.samples);
+        }
+        if let Some(update) = updates.last() {
+            self.status = Some(update.status.clone());
+            if self.arming.is_some_and(|asked| asked.elapsed() > ORDER_ROUND_TRIP) {
+                self.arming = None;
+            }
+        }
+        (updates, message)
+    }
+
+    fn take_opened(&mut self) -> Option<Result<String, String>> {
+        let State::Opening(job) = &mut self.state else { return None };
+        let result = match job.poll().1 {
+            Outcome::Running => return None,
+            Outcome::Done(result) => result,
+            Outcome::Broken => Err("Connecting failed: this is a defect of flqr.".to_owned()),
+        };
+        Some(match result {
+            Ok(mut feed) => {
+                feed.send(SessionOrder::Interval(self.interval));
+                self.state = State::Open(feed);
+                let source = self.options.as_ref().map(|options| options.source.to_string());
+                let what = if self.may_drive() { "not armed" } else { "listening only" };
+                Ok(format!("Connected to {}: {what}.", source.unwrap_or_default()))
+            }
+            Err(problem) => {
+                self.state = State::Closed;
+                let problem = sentence(&problem);
+                self.problem = Some(problem.clone());
+                Err(problem)
+            }
+        })
+    }
+
+    /// Rows of the last second.
+    pub(crate) fn rows_hz(&self) -> usize {
+        let heard = self.status.as_ref().is_some_and(|status| status.connection == Connection::Connected);
+        let times = self.history.time_s();
+        let before = times.partition_point(|time_s| *time_s <= self.history.end_s() - 1.0);
+        if heard { times.len() - before } else { 0 }
+    }
+}
+
+impl Drop for Link {
+    /// The program must not end before the motors are off.
+    fn drop(&mut self) {
+        self.state = State::Closed;
+        if let Some(thread) = self.closing.take() {
+            thread.join().ok();
+        }
+    }
+}
+
+/// An error of the core as a sentence of the window.
+pub(crate) fn sentence(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters.next().map(|first| first.to_uppercase().to_string()).unwrap_or_default();
+    let end = if text.ends_with('.') { "" } else { "." };
+    format!("{first}{}{end}", letters.as_str())
+}

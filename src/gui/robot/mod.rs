@@ -1,0 +1,270 @@
+//! The *Robot* page: connection, arming and recording at the left; health, raw frames and events at the right.
+
+mod bar;
+mod cards;
+mod drive;
+mod events;
+mod feed;
+mod form;
+mod frames;
+mod jitter;
+mod link;
+mod record;
+mod snapshot;
+
+use std::path::Path;
+use std::sync::Arc;
+
+use egui::{Button, CentralPanel, Frame, Label, Margin, Panel, RichText, ScrollArea, Ui, UiBuilder, vec2};
+use flqr_core::control::drive::Stage;
+use flqr_core::device::{Connection, SessionOptions, Source as DeviceSource, Update};
+
+use crate::command::{Command, FilePurpose, Source};
+use crate::context::ViewContext;
+use crate::job::{Job, Outcome, Waker};
+use crate::recent::Recent;
+use crate::theme::palette;
+use crate::widgets::{hint_ui, section_ui};
+pub(crate) use bar::bar_ui;
+use events::EventLog;
+pub(crate) use feed::System;
+pub use feed::{Devices, Interfaces, Offer, RobotFeed};
+pub(crate) use form::ConnectionForm;
+use frames::FrameTable;
+pub(crate) use link::Link;
+use record::RecordForm;
+
+/// State of the page that is no part of the session with the robot.
+#[derive(Default)]
+pub(crate) struct RobotTab {
+    pub(crate) form: ConnectionForm,
+    record: RecordForm,
+    frames: FrameTable,
+    events: EventLog,
+    found: Option<Interfaces>,
+    looking: Option<Job<(), Interfaces>>,
+}
+
+impl RobotTab {
+    /// Looks for interfaces and ports.
+    pub(crate) fn look(&mut self, link: &Link, waker: &Waker) {
+        let devices = Arc::clone(link.devices());
+        self.looking = Job::start("list-interfaces", waker, move |_| devices.interfaces()).ok();
+    }
+
+    /// Takes in what was found.
+    pub(crate) fn drain(&mut self) {
+        let Some(job) = &mut self.looking else { return };
+        match job.poll().1 {
+            Outcome::Running => return,
+            Outcome::Done(found) => self.found = Some(found),
+            Outcome::Broken => self.found = Some(Interfaces::default()),
+        }
+        self.looking = None;
+    }
+
+    /// Takes in what the robot has told.
+    pub(crate) fn note(&mut self, update: &Update) {
+        self.frames.extend(&update.frames);
+        self.events.extend(&update.events);
+    }
+
+    /// Forgets what the last session has brought.
+    pub(crate) fn forget(&mut self) {
+        self.frames.clear();
+        self.events.clear();
+    }
+
+    /// Another session begins.
+    pub(crate) fn begin(&mut self, options: &SessionOptions) {
+        self.forget();
+        self.record.suggest();
+        self.form.dialog_problem = None;
+        if let DeviceSource::Replay { .. } = options.source {
+            self.form.replay_speed = options.replay_speed;
+        }
+    }
+
+    /// Goes on where the last connection was, unless something has been typed.
+    pub(crate) fn suggest(&mut self, recent: &Recent) {
+        if self.form != ConnectionForm::default() {
+            return;
+        }
+        let fill = |field: &mut String, text: &str| {
+            if !text.is_empty() {
+                text.clone_into(field);
+            }
+        };
+        fill(&mut self.form.interface, &recent.can_interface);
+        for (field, text) in [&mut self.form.port, &mut self.form.bit_rate].into_iter().zip(&recent.slcan) {
+            fill(field, text);
+        }
+        for (field, text) in [&mut self.form.imu_port, &mut self.form.imu_baud].into_iter().zip(&recent.imu) {
+            fill(field, text);
+        }
+    }
+
+    /// Chooses the file to record to.
+    pub(crate) fn note_recording_path(&mut self, path: &Path) {
+        self.record.path = path.display().to_string();
+        self.record.dialog_problem = None;
+    }
+
+    pub(crate) fn note_dialog_problem(&mut self, purpose: FilePurpose, problem: &str) {
+        match purpose {
+            FilePurpose::OpenReplay => self.form.dialog_problem = Some(problem.to_owned()),
+            FilePurpose::SaveRecording => self.record.dialog_problem = Some(problem.to_owned()),
+            _ => {}
+        }
+    }
+
+    /// Name that a dialog offers.
+    pub(crate) fn suggested_name(&self) -> String {
+        let name = Path::new(&self.record.path).file_name();
+        name.map_or_else(|| "robot.csv".to_owned(), |name| name.to_string_lossy().into_owned())
+    }
+
+    /// The page; says whether STOP was pressed.
+    pub(crate) fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) -> bool {
+        let side = Frame::side_top_panel(ui.style()).inner_margin(Margin::symmetric(10, 6));
+        let stop = Panel::left("connection")
+            .frame(side)
+            .resizable(true)
+            .default_size(280.0)
+            .size_range(250.0..=420.0)
+            .show(ui, |ui| ScrollArea::vertical().show(ui, |ui| self.side_ui(context, ui)).inner)
+            .inner;
+        let middle = Frame::central_panel(ui.style()).inner_margin(Margin::symmetric(10, 6));
+        CentralPanel::default().frame(middle).show(ui, |ui| self.middle_ui(context, ui));
+        stop
+    }
+
+    fn side_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) -> bool {
+        if context.source == Source::Simulated {
+            section_ui(ui, "Connection", |_| {});
+            hint_ui(
+                ui,
+                "The source is the simulated robot: it runs in this program and needs no connection.",
+            );
+            return false;
+        }
+        if !context.link.is_open() {
+            self.form.ui(context, self.found.as_ref(), ui);
+            return false;
+        }
+        self.connected_ui(context, ui);
+        let stop = if context.link.is_replay() { false } else { drive::drive_ui(context, ui) };
+        if !context.link.is_replay() {
+            self.record.ui(context, ui);
+        }
+        stop
+    }
+
+    fn connected_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
+        let Some(options) = context.link.options() else { return };
+        section_ui(ui, "Connection", |ui| {
+            let (name, help) = if context.link.is_replay() {
+                ("Close", "Close the recording")
+            } else {
+                ("Disconnect", "Close the connection; a driven robot is stopped")
+            };
+            if ui.button(name).on_hover_text(help).clicked() {
+                context.commands.send(Command::Disconnect);
+            }
+        });
+        ui.add(Label::new(RichText::new(options.source.to_string()).monospace()).wrap());
+        if let Some(imu) = &options.imu {
+            ui.label(RichText::new(format!("IMU {} at {} bit/s", imu.port, imu.baud)).small());
+        }
+        if context.link.is_replay() {
+            bar::replay_ui(context, &mut self.form.replay_speed, ui);
+        }
+    }
+
+    fn middle_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
+        let Some(status) = &context.link.status else {
+            empty_ui(context, ui);
+            return;
+        };
+        banner_ui(context, ui);
+        cards::cards_ui(status, ui);
+        ui.add_space(4.0);
+        let spacing = ui.spacing().item_spacing.x + 6.0;
+        let room = ui.available_rect_before_wrap();
+        let events = (0.36 * room.width()).clamp(0.0, 560.0);
+        let (mut left, mut right) = (room, room);
+        left.max.x = (room.max.x - events - spacing).max(left.min.x);
+        right.min.x = room.max.x - events;
+        ui.scope_builder(UiBuilder::new().max_rect(left).id_salt("frames"), |ui| {
+            ui.set_clip_rect(left.intersect(ui.clip_rect()));
+            self.frames.ui(ui);
+        });
+        ui.scope_builder(UiBuilder::new().max_rect(right).id_salt("events"), |ui| {
+            ui.set_clip_rect(right.intersect(ui.clip_rect()));
+            self.events.ui(ui);
+        });
+    }
+}
+
+/// Why the robot was stopped, or why nothing is heard, in large letters, with the mend.
+fn banner_ui(context: &ViewContext<'_>, ui: &mut Ui) {
+    let colors = palette(ui.visuals());
+    let connection = context.link.status.as_ref().map(|status| &status.connection);
+    let (title, text, color) = match (context.link.stage(), connection) {
+        (None, _) => ("Disconnected", "These are the last readings.".to_owned(), colors.reference),
+        (Some(Stage::Stopped(reason)), _) => ("Stopped", bar::stopped(&reason), colors.error),
+        (_, Some(Connection::Silent { hint })) => ("Silent", link::sentence(hint), colors.warning),
+        (_, Some(Connection::Lost { reason })) => {
+            ("Lost", format!("{} It is tried again by itself.", link::sentence(reason)), colors.warning)
+        }
+        _ => return,
+    };
+    let frame = Frame::new()
+        .stroke(egui::Stroke::new(1.5, color))
+        .corner_radius(6)
+        .inner_margin(Margin::symmetric(12, 8));
+    frame.show(ui, |ui| {
+        ui.set_width(ui.available_width());
+        ui.horizontal_top(|ui| {
+            ui.label(RichText::new(title).size(18.0).strong().color(color));
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Min), |ui| {
+                if matches!(context.link.stage(), Some(Stage::Stopped(_))) {
+                    use flqr_core::control::drive::DriveOrder;
+                    use flqr_core::device::SessionOrder;
+                    let release = Button::new("Release").min_size(vec2(90.0, 26.0));
+                    if ui
+                        .add(release)
+                        .accessible_name("Release the stop")
+                        .on_hover_text("Back to listening")
+                        .clicked()
+                    {
+                        context.commands.send(Command::Order(SessionOrder::Drive(DriveOrder::Release)));
+                    }
+                }
+                ui.with_layout(egui::Layout::left_to_right(egui::Align::Min), |ui| {
+                    ui.add(Label::new(RichText::new(text).size(15.0)).wrap());
+                });
+            });
+        });
+    });
+}
+
+fn empty_ui(context: &ViewContext<'_>, ui: &mut Ui) {
+    ui.add_space(0.3 * ui.available_height());
+    ui.vertical_centered(|ui| {
+        let link = context.link;
+        if link.is_open() || link.is_opening() {
+            ui.heading(if link.is_open() { "Waiting for the first readings…" } else { "Connecting…" });
+        } else if context.source == Source::Simulated {
+            ui.heading("No robot is connected");
+            hint_ui(ui, "Choose where its frames come from at the top: CAN, SLCAN, a recording, or the emulated robot.");
+            ui.add_space(8.0);
+            if ui.button("Try the emulated robot").clicked() {
+                context.commands.send(Command::SelectSource(Source::Emulated));
+            }
+        } else {
+            ui.heading("Not connected");
+            hint_ui(ui, "Fill in the form at the left and connect. Motors, IMU, bus and raw frames appear here, the plots on the Tune tab.");
+        }
+    });
+}
