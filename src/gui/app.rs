@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use egui::{Context, Ui};
 use flqr_core::control::ControllerKind;
+use flqr_core::control::drive::Stage;
 use flqr_core::model_file::Model;
 
 use crate::command::{Command, Commands, Source};
@@ -217,6 +218,7 @@ impl App {
     }
 
     fn drain_link(&mut self) {
+        let before = self.link.stage();
         let (updates, message) = self.link.drain();
         for update in &updates {
             self.robot.note(update);
@@ -230,6 +232,22 @@ impl App {
                 // What is there may have changed.
                 self.robot.look(&self.link, &self.waker);
             }
+        }
+        self.say_stage(before);
+    }
+
+    /// The status line must not say what was true of the stage before.
+    fn say_stage(&mut self, before: Option<Stage>) {
+        let stage = self.link.stage();
+        let (Some(_), Some(now)) = (before, stage) else { return };
+        if before == stage {
+            return;
+        }
+        match now {
+            Stage::Listening => self.say("Listening: nothing is sent."),
+            Stage::Checking => self.say("Checking: the motors are asked for readings, without torque."),
+            Stage::Driving => self.say("Driving: Esc and Space stop the robot."),
+            Stage::Stopped(reason) => self.fail(format!("Stopped: {reason}.")),
         }
     }
 

@@ -128,6 +128,12 @@ pub(super) fn connection_text(link: &Link) -> (String, bool) {
         Connection::Connected if link.stage() == Some(Stage::Listening) => {
             ("connected; not armed, nothing is sent".to_owned(), true)
         }
+        Connection::Connected if link.stage() == Some(Stage::Checking) => {
+            ("motors are asked for readings, without torque".to_owned(), true)
+        }
+        Connection::Connected if link.stage() == Some(Stage::Driving) => {
+            ("the motors are driven".to_owned(), true)
+        }
         Connection::Connected => ("connected".to_owned(), true),
         Connection::Silent { hint } => (format!("silent: {hint}"), false),
         Connection::Lost { reason } => (format!("lost, trying again: {reason}"), false),

@@ -4,8 +4,10 @@ use std::collections::VecDeque;
 use std::fmt::Write;
 
 use egui::{Label, RichText, ScrollArea, TextEdit, Ui};
-use flqr_core::link::{Direction, FrameId, FrameKind, StampedFrame};
+use flqr_core::link::{Direction, FrameId, StampedFrame};
+use flqr_core::robot::LinkSettings;
 
+use super::meaning::meaning;
 use crate::widgets::{choice_ui, hint_ui, mono, section_ui};
 
 /// Frames that are kept, before and after the filter.
@@ -54,7 +56,7 @@ impl Filter {
 }
 
 impl Test {
-    fn passes(&self, stamped: &StampedFrame, buffer: &mut String) -> bool {
+    fn passes(&self, stamped: &StampedFrame, settings: &LinkSettings, buffer: &mut String) -> bool {
         let way = match self.way {
             Way::Both => true,
             Way::Received => stamped.direction == Direction::Received,
@@ -71,7 +73,7 @@ impl Test {
             push(buffer, format_args!("{byte:02x}"));
         }
         buffer.contains(&self.text)
-            || meaning(stamped).is_some_and(|text| text.to_lowercase().contains(&self.text))
+            || meaning(stamped, settings).is_some_and(|text| text.to_lowercase().contains(&self.text))
     }
 }
 
@@ -84,6 +86,8 @@ pub(crate) struct FrameTable {
     test: Test,
     problem: Option<String>,
     held: bool,
+    /// Those of the robot that the frames come from.
+    settings: LinkSettings,
     buffer: String,
 }
 
@@ -95,13 +99,15 @@ impl FrameTable {
         }
         for frame in frames {
             keep(&mut self.all, *frame);
-            if self.test.passes(frame, &mut self.buffer) {
+            if self.test.passes(frame, &self.settings, &mut self.buffer) {
                 keep(&mut self.shown, *frame);
             }
         }
     }
 
-    pub(super) fn clear(&mut self) {
+    /// Forgets all frames; those that come are of a robot with these settings.
+    pub(super) fn begin(&mut self, settings: LinkSettings) {
+        self.settings = settings;
         self.all.clear();
         self.shown.clear();
     }
@@ -117,7 +123,9 @@ impl FrameTable {
             Err(problem) => return self.problem = Some(problem),
         }
         self.shown.clear();
-        self.shown.extend(self.all.iter().filter(|frame| self.test.passes(frame, &mut self.buffer)));
+        self.shown.extend(
+            self.all.iter().filter(|frame| self.test.passes(frame, &self.settings, &mut self.buffer)),
+        );
     }
 
     pub(super) fn ui(&mut self, ui: &mut Ui) {
@@ -176,7 +184,7 @@ impl FrameTable {
             for row in rows {
                 // The newest comes first.
                 let Some(frame) = self.shown.iter().rev().nth(row) else { continue };
-                ui.add(Label::new(mono(line(frame))).truncate());
+                ui.add(Label::new(mono(line(frame, &self.settings))).truncate());
             }
         });
     }
@@ -189,7 +197,7 @@ fn keep(frames: &mut VecDeque<StampedFrame>, frame: StampedFrame) {
     frames.push_back(frame);
 }
 
-fn line(stamped: &StampedFrame) -> String {
+fn line(stamped: &StampedFrame, settings: &LinkSettings) -> String {
     let frame = &stamped.frame;
     let way = if stamped.direction == Direction::Sent { "tx" } else { "rx" };
     let id = match frame.id() {
@@ -204,17 +212,8 @@ fn line(stamped: &StampedFrame) -> String {
     while text.len() < start + 25 {
         text.push(' ');
     }
-    match frame.kind() {
-        FrameKind::Data => text.push_str(&meaning(stamped).unwrap_or_default()),
-        FrameKind::Remote => text.push_str("remote request"),
-        FrameKind::Error => text.push_str("error frame"),
-    }
+    text.push_str(&meaning(stamped, settings).unwrap_or_default());
     text
-}
-
-/// What the bytes say, where that is known.
-fn meaning(_stamped: &StampedFrame) -> Option<String> {
-    None
 }
 
 fn push(text: &mut String, part: std::fmt::Arguments<'_>) {
@@ -304,7 +303,7 @@ mod tests {
                 "     1.5000  tx  001ABCDE  8                           remote request",
             ),
         ] {
-            assert_eq!(line(&stamped(frame)).trim_end(), text);
+            assert_eq!(line(&stamped(frame), &LinkSettings::default()).trim_end(), text);
         }
     }
 }

@@ -9,6 +9,7 @@ mod form;
 mod frames;
 mod jitter;
 mod link;
+mod meaning;
 mod record;
 mod snapshot;
 
@@ -18,6 +19,7 @@ use std::sync::Arc;
 use egui::{Button, CentralPanel, Frame, Label, Margin, Panel, RichText, ScrollArea, Ui, UiBuilder, vec2};
 use flqr_core::control::drive::Stage;
 use flqr_core::device::{Connection, SessionOptions, Source as DeviceSource, Update};
+use flqr_core::robot::LinkSettings;
 
 use crate::command::{Command, FilePurpose, Source};
 use crate::context::ViewContext;
@@ -71,13 +73,14 @@ impl RobotTab {
 
     /// Forgets what the last session has brought.
     pub(crate) fn forget(&mut self) {
-        self.frames.clear();
+        self.frames.begin(LinkSettings::default());
         self.events.clear();
     }
 
     /// Another session begins.
     pub(crate) fn begin(&mut self, options: &SessionOptions) {
         self.forget();
+        self.frames.begin(options.robot.link);
         self.record.suggest();
         self.form.dialog_problem = None;
         if let DeviceSource::Replay { .. } = options.source {
@@ -242,7 +245,11 @@ fn banner_ui(context: &ViewContext<'_>, ui: &mut Ui) {
                     }
                 }
                 ui.with_layout(egui::Layout::left_to_right(egui::Align::Min), |ui| {
-                    ui.add(Label::new(RichText::new(text).size(15.0)).wrap());
+                    ui.vertical(|ui| {
+                        // On the line of the title, whose letters are larger.
+                        ui.add_space(3.0);
+                        ui.add(Label::new(RichText::new(text).size(15.0)).wrap());
+                    });
                 });
             });
         });
