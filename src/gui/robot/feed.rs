@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use flqr_core::device::{SessionOptions, SessionOrder, Update};
+use flqr_core::device::{self, Interfaces, SessionOptions, SessionOrder, Update};
 
 use crate::job::Waker;
 
@@ -13,6 +13,9 @@ pub trait RobotFeed: Send {
 
     /// All updates since the last call. Never waits.
     fn poll(&mut self) -> Vec<Update>;
+
+    /// Whether it has ended although nobody asked for it.
+    fn has_died(&self) -> bool;
 }
 
 /// What opens robots, and knows where they could be.
@@ -27,28 +30,6 @@ pub trait Devices: fmt::Debug + Send + Sync {
     fn interfaces(&self) -> Interfaces;
 }
 
-/// What there is to connect to.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Interfaces {
-    /// CAN interfaces of the system.
-    pub can: Vec<Offer>,
-    /// Serial ports.
-    pub serial: Vec<Offer>,
-    /// Commands that make a CAN interface.
-    pub commands: Vec<String>,
-}
-
-/// One of them.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Offer {
-    /// What to connect to.
-    pub name: String,
-    /// How it stands, in a few words.
-    pub text: String,
-    /// Whether it can be used as it stands.
-    pub usable: bool,
-}
-
 /// The robots of this machine.
 #[derive(Debug)]
 pub(crate) struct System;
@@ -59,6 +40,6 @@ impl Devices for System {
     }
 
     fn interfaces(&self) -> Interfaces {
-        Interfaces::default()
+        device::interfaces()
     }
 }

@@ -2,15 +2,14 @@
 
 use egui::{Button, ComboBox, Grid, RichText, TextEdit, Ui, vec2};
 use flqr_core::control::drive::Excitation;
-use flqr_core::device::{SerialAddress, SessionMode, SessionOptions, Source as DeviceSource};
+use flqr_core::device::{Interfaces, SerialAddress, SessionMode, SessionOptions, Source as DeviceSource};
 
-use super::feed::{Interfaces, Offer};
+use super::offers::{can_ui, ports_ui};
 use crate::command::{Command, FilePurpose, Source};
 use crate::context::ViewContext;
 use crate::design::Designer;
 use crate::session::Session;
-use crate::theme::palette;
-use crate::widgets::{choice_ui, error_ui, hint_ui, mono, number_ui, section_ui, warning_ui};
+use crate::widgets::{choice_ui, error_ui, hint_ui, number_ui, section_ui, warning_ui};
 
 const BIT_RATES: [u32; 9] = [1_000_000, 800_000, 500_000, 250_000, 125_000, 100_000, 50_000, 20_000, 10_000];
 const BAUD_RATES: [u32; 8] = [9600, 19_200, 38_400, 57_600, 115_200, 230_400, 460_800, 921_600];
@@ -210,14 +209,7 @@ impl ConnectionForm {
     }
 
     fn can_ui(&mut self, found: Option<&Interfaces>, ui: &mut Ui) {
-        match found {
-            None => drop(hint_ui(ui, "Looking for CAN interfaces…")),
-            Some(found) if found.can.is_empty() => {
-                warning_ui(ui, "No CAN interface was found. One of these commands makes one:");
-                commands_ui(&found.commands, ui);
-            }
-            Some(found) => offers_ui(&found.can, &mut self.interface, ui),
-        }
+        can_ui(found, &mut self.interface, ui);
         Grid::new("can").num_columns(2).spacing([10.0, 4.0]).show(ui, |ui| {
             field_ui(ui, "interface", &mut self.interface, "can0", "CAN interface");
         });
@@ -394,47 +386,4 @@ fn rate_ui(ui: &mut Ui, label: &str, text: &mut String, choices: &[u32], name: &
         combo.response.accessible_name(format!("usual values of the {name}"));
     });
     ui.end_row();
-}
-
-fn ports_ui(found: Option<&Interfaces>, chosen: &mut String, ui: &mut Ui) {
-    match found {
-        None => drop(hint_ui(ui, "Looking for serial ports…")),
-        Some(found) if found.serial.is_empty() => {
-            hint_ui(ui, "No serial port was found: plug the adapter in and press Refresh, or type a path.");
-        }
-        Some(found) => offers_ui(&found.serial, chosen, ui),
-    }
-}
-
-/// One line for each: its name, and how it stands.
-fn offers_ui(offers: &[Offer], chosen: &mut String, ui: &mut Ui) {
-    let colors = palette(ui.visuals());
-    for offer in offers {
-        ui.horizontal(|ui| {
-            let button = Button::selectable(*chosen == offer.name, mono(&offer.name));
-            if ui.add(button).on_hover_text(format!("Use {}", offer.name)).clicked() {
-                chosen.clone_from(&offer.name);
-            }
-            let text = RichText::new(&offer.text).small();
-            let text = if offer.usable { text.weak() } else { text.color(colors.warning) };
-            ui.add(egui::Label::new(text).truncate()).on_hover_text(&offer.text);
-        });
-    }
-}
-
-/// Commands with a button each that copies them.
-fn commands_ui(commands: &[String], ui: &mut Ui) {
-    for command in commands {
-        ui.horizontal(|ui| {
-            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                let copy = ui.button("Copy").on_hover_text("Copy the command");
-                if copy.clicked() {
-                    ui.ctx().copy_text(command.clone());
-                }
-                ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
-                    ui.add(egui::Label::new(mono(command).small()).wrap());
-                });
-            });
-        });
-    }
 }

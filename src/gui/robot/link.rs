@@ -187,6 +187,7 @@ impl Link {
         let message = self.take_opened();
         let State::Open(feed) = &mut self.state else { return (Vec::new(), message) };
         let updates = feed.poll();
+        let died = feed.has_died();
         for update in &updates {
             self.rows += update.samples.len() as u64;
             self.history.extend(&update.samples);
@@ -196,6 +197,13 @@ impl Link {
             if self.arming.is_some_and(|asked| asked.elapsed() > ORDER_ROUND_TRIP) {
                 self.arming = None;
             }
+        }
+        if died {
+            self.state = State::Closed;
+            self.arming = None;
+            let problem = "The session with the robot has ended by itself: this is a defect of flqr. Switch the robot off by hand if it still moves.";
+            self.problem = Some(problem.to_owned());
+            return (updates, Some(Err(problem.to_owned())));
         }
         (updates, message)
     }

@@ -10,6 +10,7 @@ mod frames;
 mod jitter;
 mod link;
 mod meaning;
+mod offers;
 mod record;
 mod snapshot;
 
@@ -18,7 +19,7 @@ use std::sync::Arc;
 
 use egui::{Button, CentralPanel, Frame, Label, Margin, Panel, RichText, ScrollArea, Ui, UiBuilder, vec2};
 use flqr_core::control::drive::Stage;
-use flqr_core::device::{Connection, SessionOptions, Source as DeviceSource, Update};
+use flqr_core::device::{Connection, Interfaces, SessionOptions, Source as DeviceSource, Update};
 use flqr_core::robot::LinkSettings;
 
 use crate::command::{Command, FilePurpose, Source};
@@ -30,7 +31,7 @@ use crate::widgets::{hint_ui, section_ui};
 pub(crate) use bar::bar_ui;
 use events::EventLog;
 pub(crate) use feed::System;
-pub use feed::{Devices, Interfaces, Offer, RobotFeed};
+pub use feed::{Devices, RobotFeed};
 pub(crate) use form::ConnectionForm;
 use frames::FrameTable;
 pub(crate) use link::Link;
@@ -60,7 +61,9 @@ impl RobotTab {
         match job.poll().1 {
             Outcome::Running => return,
             Outcome::Done(found) => self.found = Some(found),
-            Outcome::Broken => self.found = Some(Interfaces::default()),
+            Outcome::Broken => {
+                self.found = Some(Interfaces { can: Vec::new(), serial: Vec::new(), advice: Vec::new() });
+            }
         }
         self.looking = None;
     }

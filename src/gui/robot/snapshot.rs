@@ -31,10 +31,7 @@ impl RobotTab {
             "frames_shown": self.frames.shown(),
             "events": self.events.len(),
             "last_event": last_event,
-            "interfaces": self.found.as_ref().map(|found| {
-                let names = |offers: &[super::Offer]| offers.iter().map(|offer| offer.name.clone()).collect::<Vec<_>>();
-                json!({ "can": names(&found.can), "serial": names(&found.serial), "commands": found.commands })
-            }),
+            "interfaces": self.found,
             "message": link.problem,
         })
     }

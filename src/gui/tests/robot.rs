@@ -13,13 +13,14 @@ use egui::{Event as Input, Key, Modifiers, Vec2, vec2};
 use egui_kittest::kittest::Queryable;
 use flqr_core::control::drive::{Check, CheckResult, DriveOrder, Excitation, Stage, StopReason};
 use flqr_core::device::{
-    Connection, Counters, DriveStatus, Event, EventKind, ImuStatus, MotorStatus, RecordingStatus,
-    SessionMode, SessionOptions, SessionOrder, Source, Status, Timing, Update,
+    Advice, CanInterface, Connection, Counters, DriveStatus, Event, EventKind, ImuStatus, Interfaces,
+    MotorStatus, RecordingStatus, SerialPort, SessionMode, SessionOptions, SessionOrder, Source, Status,
+    Timing, Update,
 };
 use flqr_core::link::{Direction, Frame, FrameId, MotorErrors, MotorHealth, StampedFrame};
 use flqr_core::record::Sample;
 use flqr_core::robot::Motor;
-use flqr_gui::robot::{Devices, Interfaces, Offer, RobotFeed};
+use flqr_gui::robot::{Devices, RobotFeed};
 use flqr_gui::{Tab, WindowOptions};
 use serde_json::Value;
 
@@ -30,8 +31,11 @@ struct Shared {
     orders: Vec<SessionOrder>,
     updates: Vec<Update>,
     closed: bool,
+    died: bool,
     refuse: Option<String>,
-    found: Interfaces,
+    can: Vec<CanInterface>,
+    serial: Vec<SerialPort>,
+    advice: Vec<Advice>,
 }
 
 #[derive(Clone, Debug, Default)]
@@ -68,6 +72,10 @@ impl RobotFeed for ScriptFeed {
     fn poll(&mut self) -> Vec<Update> {
         self.0.with(|shared| std::mem::take(&mut shared.updates))
     }
+
+    fn has_died(&self) -> bool {
+        self.0.with(|shared| shared.died)
+    }
 }
 
 impl Drop for ScriptFeed {
@@ -90,7 +98,39 @@ impl Devices for Script {
     }
 
     fn interfaces(&self) -> Interfaces {
-        self.with(|shared| shared.found.clone())
+        self.with(|shared| Interfaces {
+            can: shared.can.clone(),
+            serial: shared.serial.clone(),
+            advice: shared.advice.clone(),
+        })
+    }
+}
+
+fn can(name: &str, command: Option<&str>) -> CanInterface {
+    CanInterface {
+        name: name.to_owned(),
+        up: command.is_none(),
+        is_virtual: false,
+        state: None,
+        bit_rate: Some(500_000),
+        send_errors: None,
+        receive_errors: None,
+        received: 0,
+        sent: 0,
+        errors: 0,
+        dropped: 0,
+        command: command.map(str::to_owned),
+    }
+}
+
+fn usb(port: &str) -> SerialPort {
+    SerialPort {
+        port: port.to_owned(),
+        stable_name: None,
+        description: Some("CH340".to_owned()),
+        serial_number: None,
+        driver: None,
+        is_usb: true,
     }
 }
 
@@ -283,13 +323,16 @@ fn what_cannot_be_opened_is_said_with_its_mend() {
 fn interfaces_are_listed_and_chosen_and_without_any_the_commands_are_shown() {
     let script = Script::default();
     let command = "sudo ip link set can0 up type can bitrate 1000000";
-    script.with(|shared| shared.found.commands = vec![command.to_owned()]);
+    let advice =
+        |command: &str| Advice { purpose: "an adapter".to_owned(), commands: vec![command.to_owned()] };
+    script.with(|shared| shared.advice = vec![advice(command), advice("flqr monitor emulated")]);
     let window_options = WindowOptions { devices: Arc::new(script.clone()), ..options(Tab::Robot) };
     let mut window = open(window_options, SIZE);
     click(&mut window, "CAN");
     until(&mut window, "the list", |s| s["robot_tab"]["interfaces"].is_object());
     window.run_steps(2);
     window.get_by_label(command);
+    assert!(window.query_by_label("flqr monitor emulated").is_none(), "the window does that by itself");
     window.get_by_label("Copy").click();
     let mut copied = Vec::new();
     for _ in 0..3 {
@@ -301,15 +344,17 @@ fn interfaces_are_listed_and_chosen_and_without_any_the_commands_are_shown() {
         "{copied:?}"
     );
 
-    let offer = |name: &str, text: &str| Offer { name: name.to_owned(), text: text.to_owned(), usable: true };
     script.with(|shared| {
-        shared.found.can = vec![offer("can0", "down"), offer("vcan0", "up")];
-        shared.found.serial = vec![offer("/dev/ttyUSB0", "CH340")];
+        shared.can = vec![can("can0", Some("sudo ip link set can0 up")), can("vcan0", None)];
+        shared.serial = vec![usb("/dev/ttyUSB0")];
     });
     click(&mut window, "Refresh");
-    until(&mut window, "the list", |s| s["robot_tab"]["interfaces"]["can"][1] == "vcan0");
+    until(&mut window, "the list", |s| s["robot_tab"]["interfaces"]["can"][1]["name"] == "vcan0");
     window.run_steps(2);
+    window.get_by_label("up, 500 kbit/s, 0 errors");
+    window.get_by_label("sudo ip link set can0 up");
     click(&mut window, "vcan0");
+    assert!(window.query_by_label("sudo ip link set can0 up").is_none(), "the chosen one is up");
     click(&mut window, "/dev/ttyUSB0");
     enter(&mut window, "baud rate of the IMU", "921600");
     click(&mut window, "Connect");
@@ -495,6 +540,17 @@ fn a_closed_session_is_stopped_and_let_go() {
     let other = Script::default();
     drop(drive_window(&other));
     assert!(other.with(|shared| shared.closed), "with the window");
+}
+
+#[test]
+fn a_session_that_ends_by_itself_is_said() {
+    let script = Script::default();
+    let mut window = drive_window(&script);
+    arm(&mut window, &script);
+    script.with(|shared| shared.died = true);
+    let ended = until(&mut window, "the end", |s| s["robot_tab"]["session"] == "closed");
+    assert!(ended["message"].as_str().unwrap().contains("Switch the robot off by hand"), "{ended:#}");
+    assert_eq!(ended["robot_tab"]["stage"], "disconnected");
 }
 
 #[test]
