@@ -10,6 +10,7 @@ use std::time::Duration;
 use egui::{Context, Ui};
 use flqr_core::control::ControllerKind;
 use flqr_core::control::drive::Stage;
+use flqr_core::device::{Event, EventKind};
 use flqr_core::model_file::Model;
 
 use crate::command::{Command, Commands, Source};
@@ -22,7 +23,7 @@ use crate::history::{Channel, History};
 use crate::job::{Job, Outcome, Waker};
 use crate::live::{Live, LiveCommand};
 use crate::recent::{Recent, RecentFile};
-use crate::robot::{Link, RobotTab};
+use crate::robot::{Link, RobotTab, sentence};
 use crate::session::Session;
 use crate::state_out::StateOut;
 use crate::tune::TuneTab;
@@ -222,6 +223,12 @@ impl App {
         let (updates, message) = self.link.drain();
         for update in &updates {
             self.robot.note(update);
+        }
+        // A recording that could not be started, for instance: said where it is seen from every page.
+        let warning = |event: &&Event| event.kind == EventKind::Warning;
+        let mut warnings = updates.iter().flat_map(|update| &update.events).filter(warning);
+        if let Some(warning) = warnings.next_back() {
+            self.fail(sentence(&warning.text));
         }
         self.robot.drain();
         match message {

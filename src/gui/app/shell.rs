@@ -36,9 +36,9 @@ impl App {
         let bar = Frame::side_top_panel(ui.style()).inner_margin(Margin::symmetric(10, 5));
         Panel::top("head").frame(bar).show(ui, |ui| self.head_ui(ui));
         if self.source != Source::Simulated {
-            let (link, source, commands) = (&self.link, self.source, &self.commands);
+            let (link, page, commands) = (&self.link, (self.source, self.tab), &self.commands);
             let strip = Panel::top("robot strip").frame(bar);
-            if strip.show(ui, |ui| bar_ui(link, source, commands, ui)).inner {
+            if strip.show(ui, |ui| bar_ui(link, page, commands, ui)).inner {
                 self.link.stop();
             }
         }

@@ -17,7 +17,7 @@ const STOP_FILL: Color32 = Color32::from_rgb(196, 32, 28);
 const STOP_HEIGHT: f32 = 30.0;
 
 /// The strip; says whether STOP was pressed.
-pub(crate) fn bar_ui(link: &Link, source: Source, commands: &Commands, ui: &mut Ui) -> bool {
+pub(crate) fn bar_ui(link: &Link, (source, tab): (Source, Tab), commands: &Commands, ui: &mut Ui) -> bool {
     ui.horizontal(|ui| {
         ui.set_height(STOP_HEIGHT);
         chip_ui(link, ui);
@@ -26,7 +26,7 @@ pub(crate) fn bar_ui(link: &Link, source: Source, commands: &Commands, ui: &mut 
             recording_ui(link, ui);
             rates_ui(link, ui);
             ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
-                text_ui(link, source, commands, ui);
+                text_ui(link, (source, tab), commands, ui);
             });
             stop
         })
@@ -68,10 +68,11 @@ fn chip_ui(link: &Link, ui: &mut Ui) {
     });
 }
 
-fn text_ui(link: &Link, source: Source, commands: &Commands, ui: &mut Ui) {
+fn text_ui(link: &Link, (source, tab): (Source, Tab), commands: &Commands, ui: &mut Ui) {
     let colors = palette(ui.visuals());
     let Some(options) = link.options() else {
-        if ui.button("Go to connection").on_hover_text("The Robot tab (Ctrl+4)").clicked() {
+        let away = tab != Tab::Robot;
+        if away && ui.button("Go to connection").on_hover_text("The Robot tab (Ctrl+4)").clicked() {
             commands.send(Command::SelectTab(Tab::Robot));
         }
         ui.weak(format!("{}: nothing is connected", source.name()));

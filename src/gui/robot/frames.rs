@@ -184,7 +184,8 @@ impl FrameTable {
             for row in rows {
                 // The newest comes first.
                 let Some(frame) = self.shown.iter().rev().nth(row) else { continue };
-                ui.add(Label::new(mono(line(frame, &self.settings))).truncate());
+                let line = line(frame, &self.settings);
+                ui.add(Label::new(mono(&line)).truncate()).on_hover_text(mono(line));
             }
         });
     }

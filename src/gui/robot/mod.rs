@@ -17,7 +17,9 @@ mod snapshot;
 use std::path::Path;
 use std::sync::Arc;
 
-use egui::{Button, CentralPanel, Frame, Label, Margin, Panel, RichText, ScrollArea, Ui, UiBuilder, vec2};
+use egui::{
+    Button, CentralPanel, Frame, Label, Margin, Panel, RichText, ScrollArea, Sense, Ui, UiBuilder, vec2,
+};
 use flqr_core::control::drive::Stage;
 use flqr_core::device::{Connection, Interfaces, SessionOptions, Source as DeviceSource, Update};
 use flqr_core::robot::LinkSettings;
@@ -34,8 +36,11 @@ pub(crate) use feed::System;
 pub use feed::{Devices, RobotFeed};
 pub(crate) use form::ConnectionForm;
 use frames::FrameTable;
-pub(crate) use link::Link;
+pub(crate) use link::{Link, sentence};
 use record::RecordForm;
+
+/// Height of the tables below which the page scrolls.
+const LEAST_TABLE_HEIGHT: f32 = 230.0;
 
 /// State of the page that is no part of the session with the robot.
 #[derive(Default)]
@@ -192,12 +197,23 @@ impl RobotTab {
             empty_ui(context, ui);
             return;
         };
-        banner_ui(context, ui);
-        cards::cards_ui(status, ui);
-        ui.add_space(4.0);
+        // In a small window the page scrolls, so that tables keep a height that is of use.
+        let end = ui.max_rect().bottom();
+        ScrollArea::vertical().id_salt("health").auto_shrink(false).show(ui, |ui| {
+            banner_ui(context, ui);
+            cards::cards_ui(status, ui);
+            ui.add_space(4.0);
+            let height = (end - ui.cursor().top()).max(LEAST_TABLE_HEIGHT);
+            self.tables_ui(height, ui);
+        });
+    }
+
+    /// Raw frames at the left, events at the right.
+    fn tables_ui(&mut self, height: f32, ui: &mut Ui) {
         let spacing = ui.spacing().item_spacing.x + 6.0;
-        let room = ui.available_rect_before_wrap();
-        let events = (0.36 * room.width()).clamp(0.0, 560.0);
+        let width = ui.available_width().max(1.0);
+        let (room, _) = ui.allocate_exact_size(vec2(width, height), Sense::hover());
+        let events = (0.32 * room.width()).min(560.0);
         let (mut left, mut right) = (room, room);
         left.max.x = (room.max.x - events - spacing).max(left.min.x);
         right.min.x = room.max.x - events;

@@ -62,7 +62,7 @@ fn offer_ui(name: &str, text: &str, usable: bool, chosen: &mut String, ui: &mut 
 fn can_text(interface: &CanInterface) -> String {
     let mut words = vec![if interface.up { "up" } else { "down" }.to_owned()];
     words.extend(interface.is_virtual.then(|| "virtual".to_owned()));
-    words.extend(interface.bit_rate.map(|rate| format!("{} kbit/s", f64::from(rate) / 1e3)));
+    words.extend(interface.bit_rate.map(bit_rate));
     words.extend(interface.state.map(|state| state.to_string().to_lowercase()));
     words.push(format!("{} errors", interface.errors));
     words.extend((interface.dropped > 0).then(|| format!("{} dropped", interface.dropped)));
@@ -70,8 +70,13 @@ fn can_text(interface: &CanInterface) -> String {
 }
 
 fn port_text(port: &SerialPort) -> String {
-    let text = port.description.as_ref().or(port.driver.as_ref());
-    text.cloned().unwrap_or_else(|| "serial port".to_owned())
+    let driver = port.driver.as_ref().map(|driver| format!("driver {driver}"));
+    port.description.clone().or(driver).unwrap_or_else(|| "serial port".to_owned())
+}
+
+fn bit_rate(rate: u32) -> String {
+    let rate = f64::from(rate);
+    if rate < 1e6 { format!("{} kbit/s", rate / 1e3) } else { format!("{} Mbit/s", rate / 1e6) }
 }
 
 /// Commands with a button each that copies them.
@@ -83,7 +88,7 @@ fn commands_ui(commands: &[String], ui: &mut Ui) {
                     ui.ctx().copy_text(command.clone());
                 }
                 ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
-                    ui.add(Label::new(mono(command).small()).wrap());
+                    ui.add(Label::new(mono(command).size(11.5)).wrap());
                 });
             });
         });

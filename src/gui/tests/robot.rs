@@ -613,6 +613,7 @@ fn everything_that_is_counted_is_shown() {
     let robot = &state(&window)["robot_tab"];
     assert_eq!(robot["status"]["counters"]["dropped"], 11);
     assert_eq!(robot["last_event"], "the robot tilts");
+    assert_eq!(state(&window)["message"], "2 frames dropped.");
 }
 
 #[test]
