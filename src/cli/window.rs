@@ -29,7 +29,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "SOURCE")]
     source: Option<Source>,
     /// IMU of a robot on CAN, as serial:/dev/ttyUSB0@115200
-    #[arg(long, value_name = "serial:DEV@BAUD", value_parser = imu)]
+    #[arg(long, value_name = "serial:DEV@BAUD")]
     imu: Option<SerialAddress>,
     /// Start with the simulated robot paused
     #[arg(long)]
@@ -70,13 +70,4 @@ pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
         ..WindowOptions::new(model)
     };
     flqr_gui::run(options).map_err(Failure::from_error)
-}
-
-/// Reads `serial:DEV@BAUD`.
-fn imu(text: &str) -> Result<SerialAddress, String> {
-    let error = || format!("`{text}` is no IMU: give serial:DEV@BAUD, as serial:/dev/ttyUSB0@115200");
-    let (port, baud) =
-        text.strip_prefix("serial:").and_then(|rest| rest.rsplit_once('@')).ok_or_else(error)?;
-    let baud = baud.parse().ok().filter(|baud| *baud > 0).ok_or_else(error)?;
-    if port.is_empty() { Err(error()) } else { Ok(SerialAddress { port: port.to_owned(), baud }) }
 }

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use flqr_core::device::{self, Interfaces, SessionOptions, SessionOrder, Update};
+use flqr_core::device::{self, Interfaces, Session, SessionOptions, SessionOrder, Update};
 
 use crate::job::Waker;
 
@@ -35,11 +35,28 @@ pub trait Devices: fmt::Debug + Send + Sync {
 pub(crate) struct System;
 
 impl Devices for System {
-    fn open(&self, options: SessionOptions, _wake: Waker) -> Result<Box<dyn RobotFeed>, String> {
-        Err(format!("{} cannot be opened: this version of flqr has no link yet", options.source))
+    fn open(&self, options: SessionOptions, wake: Waker) -> Result<Box<dyn RobotFeed>, String> {
+        match Session::open(options, wake) {
+            Ok(session) => Ok(Box::new(session)),
+            Err(error) => Err(error.to_string()),
+        }
     }
 
     fn interfaces(&self) -> Interfaces {
         device::interfaces()
+    }
+}
+
+impl RobotFeed for Session {
+    fn send(&mut self, order: SessionOrder) {
+        Self::send(self, order);
+    }
+
+    fn poll(&mut self) -> Vec<Update> {
+        Self::poll(self)
+    }
+
+    fn has_died(&self) -> bool {
+        Self::has_died(self)
     }
 }
