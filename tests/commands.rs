@@ -465,3 +465,34 @@ fn without_a_display_a_sentence_names_the_commands() {
     let message = refusal(&[], 1);
     assert!(message.contains("display") && message.contains("flqr simulate"), "{message}");
 }
+
+/// Robot log in, MCAP file out; same input, same bytes.
+#[test]
+fn a_log_becomes_an_mcap_file() {
+    let log = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("convert.csv").display().to_string();
+    json(&["simulate", PAPER, "--seconds", "1", "--log", &log]);
+    let out = log.replace(".csv", ".mcap");
+    let done = json(&["convert", &log, &out]);
+    assert_eq!(done["topics"]["/state"], 1000, "{done}");
+    assert_eq!((&done["topics"]["/motors/left"], &done["dropped"]), (&1000.into(), &0.into()));
+    let file = std::fs::read(&out).unwrap();
+    assert!(file.starts_with(b"\x89MCAP0\r\n") && file.ends_with(b"\x89MCAP0\r\n"));
+    assert!(file.windows(5).any(|window| window == b"x_dot"));
+    json(&["convert", &log, &out]);
+    assert_eq!(std::fs::read(&out).unwrap(), file);
+
+    let message = refusal(&["convert", &log, "run.csv"], 1);
+    assert!(message.contains("run.csv: the last file is the one that is written"), "{message}");
+    let frames = file_of_frames();
+    let message = refusal(&["convert", &frames, "no such folder/run.mcap"], 1);
+    assert!(message.contains("no such folder/run.mcap: cannot write the MCAP file"), "{message}");
+    let nonsense = self::file("nonsense.log", "(1.0) what?\n");
+    let message = refusal(&["convert", &nonsense, &out], 1);
+    assert!(message.contains("nonsense.log: 1 of 1 rows cannot be used, the first at line 1"), "{message}");
+    assert_eq!(std::fs::read(&out).unwrap(), file, "a failure leaves what was there");
+    refusal(&["convert", &log], 2);
+}
+
+fn file_of_frames() -> String {
+    file("frames.log", "(1700000000.001000) can0 141#A100000084010000 T\n")
+}

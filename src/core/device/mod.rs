@@ -15,7 +15,8 @@ mod open_error;
 mod pacer;
 #[cfg(unix)]
 mod pty;
-#[cfg(all(test, unix))]
+#[cfg(unix)]
+#[cfg(test)]
 mod pty_tests;
 mod reconnect;
 mod recorder;

@@ -17,7 +17,7 @@ pub use types::{
 };
 
 use std::collections::VecDeque;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::thread::{Builder, JoinHandle};
 use std::time::{Duration, SystemTime};
 
@@ -153,10 +153,7 @@ impl Session {
     /// The next update; none if there is none within the time.
     pub fn wait(&mut self, timeout: Duration) -> Option<Update> {
         self.flush();
-        match self.updates.recv_timeout(timeout) {
-            Ok(update) => Some(update),
-            Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => None,
-        }
+        self.updates.recv_timeout(timeout).ok()
     }
 
     /// Whether its threads have ended although nobody asked for it: a fault of this program.

@@ -1,3 +1,6 @@
+mod air;
+mod checking;
 mod driving;
+mod listening;
 mod rig;
 mod stopping;
