@@ -1,10 +1,13 @@
 //! CAN interfaces for real. Where the kernel has no CAN the tests print `skipped`, unless `FLQR_REQUIRE_CAN` is set.
 //! They need `vcan0` and `vcan1`, up, and nobody else on them.
 #![cfg(target_os = "linux")]
-#![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+#![expect(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "a test that cannot go on fails, or says why it is skipped"
+)]
 
 use std::env;
-use std::io::{self, Write};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -19,7 +22,7 @@ fn wire() -> Option<MutexGuard<'static, ()>> {
     let found = device::interfaces().can;
     if found.iter().filter(|can| can.up && ["vcan0", "vcan1"].contains(&can.name.as_str())).count() < 2 {
         assert!(env::var_os("FLQR_REQUIRE_CAN").is_none(), "vcan0 and vcan1 are not up: {found:?}");
-        writeln!(io::stdout(), "skipped: vcan0 and vcan1 are not up").unwrap();
+        println!("skipped: vcan0 and vcan1 are not up");
         return None;
     }
     Some(WIRE.lock().unwrap_or_else(PoisonError::into_inner))
