@@ -43,7 +43,8 @@ struct Wheel {
     /// 1 or −1: its own sense as the robot drives forward.
     sign: f64,
     answers_apart: bool,
-    unanswered: Option<Unanswered>,
+    /// The newest command of each code.
+    unanswered: Vec<Unanswered>,
     temperature_c: Option<i8>,
     shaft: Option<Shaft>,
 }
@@ -74,7 +75,7 @@ impl Wheels {
             id: MotorId::new(settings.motor_ids()[motor as usize]),
             sign: settings.directions()[motor as usize].sign(),
             answers_apart: false,
-            unanswered: None,
+            unanswered: Vec::new(),
             temperature_c: None,
             shaft: None,
         };
@@ -140,7 +141,7 @@ impl Wheels {
         if ours || (address == Address::CommandOrReply(id) && wheel.is_command(bytes, time)) {
             return Some([wheel.asked(bytes, time, ours, &self.settings), None]);
         }
-        wheel.unanswered = None;
+        wheel.unanswered.retain(|asked| asked.code != bytes[0]);
         wheel.answered(Reply::decode(bytes, self.settings.state_layout)?, time, &self.settings)
     }
 
@@ -160,7 +161,7 @@ impl Wheel {
         if Command::decode(bytes).is_none() {
             return false;
         }
-        let Some(asked) = self.unanswered.filter(|asked| {
+        let Some(asked) = self.unanswered.iter().find(|asked| {
             asked.code == bytes[0] && time.saturating_sub(asked.time) <= LATEST_REPLY && !self.answers_apart
         }) else {
             return true;
@@ -182,7 +183,8 @@ impl Wheel {
         ours: bool,
         settings: &LinkSettings,
     ) -> Option<MotorEvent> {
-        self.unanswered = Some(Unanswered { code: bytes[0], time, ours });
+        self.unanswered.retain(|asked| asked.code != bytes[0]);
+        self.unanswered.push(Unanswered { code: bytes[0], time, ours });
         match Command::decode(bytes)? {
             Command::TorqueCurrent { iq } if !ours => {
                 Some(MotorEvent::Asked { motor: self.motor, time, current_a: self.current_a(iq, settings) })

@@ -327,3 +327,24 @@ fn other_frames_tell_nothing() {
         assert_eq!(wheels.receive(&frame).count(), 0);
     }
 }
+
+/// The reply to each of two commands in one millisecond is told, whichever comes first.
+#[test]
+fn commands_of_two_kinds_are_answered_apart() {
+    let settings = LinkSettings { torque_constant_nm_a: Some(0.32), ..LinkSettings::default() };
+    for first in [MotorOrder::On, MotorOrder::Off] {
+        let mut wheels = Wheels::new(&settings);
+        let orders = [first, MotorOrder::Torque([0.0; 2])];
+        let frames: Vec<Frame> = orders.iter().flat_map(|order| wheels.frames(order)).collect();
+        for frame in &frames {
+            let sent = StampedFrame { time: Duration::ZERO, direction: Direction::Sent, frame: *frame };
+            assert_eq!(wheels.receive(&sent).count(), 0);
+        }
+        let echo: [u8; 8] = frames[0].bytes().try_into().unwrap();
+        let events: Vec<_> = wheels.receive(&received(0.25, 0x141, echo)).collect();
+        let [MotorEvent::Acknowledged { motor: Motor::Left, command, .. }] = events[..] else {
+            panic!("{events:?}")
+        };
+        assert_eq!(command, echo[0]);
+    }
+}
