@@ -299,14 +299,21 @@ fn text(out: &mut dyn Write, status: &Status, newest: Option<&Sample>) -> io::Re
         )?;
     }
     let [left, right] = status.motors.map(|motor| motor.rate_hz);
-    let Counters { received_hz, bus_load, dropped, lost, errors, .. } = status.counters;
+    let Counters { received_hz, bus_load, dropped, lost, errors, late, reconnects, .. } = status.counters;
     let load = bus_load.map_or(String::new(), |load| format!(" ({:.0} % of the bus)", 100.0 * load));
     write!(
         out,
         "motors {left:.0} {right:.0} Hz  IMU {:.0} Hz  {received_hz:.0} frames/s{load}",
         status.imu.rate_hz
     )?;
-    for (name, count) in [("dropped", dropped), ("lost", lost), ("errors", errors)] {
+    let counts = [
+        ("dropped", dropped),
+        ("lost", lost),
+        ("late", late),
+        ("errors", errors),
+        ("reconnects", reconnects),
+    ];
+    for (name, count) in counts {
         if count > 0 {
             write!(out, "  {name} {count}")?;
         }

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use super::rate::Rate;
 use super::types::{Counters, ImuStatus, MotorStatus};
+use crate::device::Tick;
 use crate::link::{Direction, FrameKind, ImuReading, MotorEvent, StampedFrame, bus_load};
 use crate::record::Sample;
 use crate::record::recording::Row;
@@ -90,6 +91,12 @@ impl Tally {
         }
     }
 
+    /// A tick of the control loop.
+    pub(super) fn tick(&mut self, tick: &Tick) {
+        // The ticks that it covers are left out; it is itself the one that came late.
+        self.counters.late += u64::from(tick.skipped > 0);
+    }
+
     pub(super) fn lost(&mut self, count: u64) {
         self.counters.lost += count;
     }
@@ -150,5 +157,30 @@ impl Tally {
             age: self.imu.heard.map(|heard| now.saturating_sub(heard)),
             ..self.imu.status
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tick_is_late_from_a_period_on_however_many_it_covers() {
+        let mut tally = Tally::new(None);
+        for (late_us, skipped) in [(0, 0), (999, 0), (1000, 1), (50_500, 50), (10, 0)] {
+            let (due, late) = (Duration::from_millis(1), Duration::from_micros(late_us));
+            tally.tick(&Tick { due, late, skipped });
+        }
+        assert_eq!(tally.counters(Duration::ZERO, 0).late, 2);
+    }
+
+    #[test]
+    fn losses_of_all_stages_are_told_apart() {
+        let mut tally = Tally::new(None);
+        tally.lost(3);
+        tally.bus(7, 1, 2);
+        tally.bus(9, 1, 2);
+        let Counters { dropped, lost, errors, reconnects, .. } = tally.counters(Duration::ZERO, 4);
+        assert_eq!([dropped, lost, errors, reconnects], [9, 7, 1, 2]);
     }
 }

@@ -335,11 +335,11 @@ pub struct Counters {
     pub bus_load: Option<f64>,
     /// Frames that the system or the adapter dropped before they were read.
     pub dropped: u64,
-    /// Frames that came but did not reach a window or a recording.
+    /// Frames and samples that came but did not reach the control loop, a window or a recording.
     pub lost: u64,
     /// Error frames and damaged lines.
     pub errors: u64,
-    /// Readings that came after the tick they were for.
+    /// Ticks of the control loop that came a period late or later.
     pub late: u64,
     /// Times the bus was lost and came back.
     pub reconnects: u64,

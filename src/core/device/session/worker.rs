@@ -86,6 +86,7 @@ impl Worker {
                 break;
             }
             let now = tick.due + tick.late;
+            self.tally.tick(&tick);
             self.tick(now, tick.late);
             if self.publisher.is_due(tick.due) {
                 self.publish(now);
