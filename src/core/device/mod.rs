@@ -40,7 +40,7 @@ pub use open_error::OpenError;
 pub use pacer::{Pacer, Priority, Tick, hurry};
 pub use recorder::{Recorder, RecorderError, RecorderInput};
 pub use session::{
-    Connection, Counters, DriveStatus, Event, EventKind, ImuStatus, MotorStatus, RecordingStatus,
+    Connection, Counters, DriveStatus, Event, EventKind, FileError, ImuStatus, MotorStatus, RecordingStatus,
     SerialAddress, SerialAddressError, Session, SessionError, SessionMode, SessionOptions, SessionOrder,
     Source, SourceError, Status, Timing, Update, Waker,
 };

@@ -1,14 +1,18 @@
 //! A robot that is watched or driven, on threads of its own.
 
+mod files;
 mod hearing;
 mod link;
+mod player;
 mod publisher;
 mod rate;
+mod replaying;
 mod tally;
 mod types;
 mod wire;
 mod worker;
 
+pub use files::FileError;
 pub use publisher::Waker;
 pub use types::{
     Connection, Counters, DriveStatus, Event, EventKind, ImuStatus, MotorStatus, RecordingStatus,
@@ -27,10 +31,12 @@ use crate::control::{BalanceController, ControlError, ControllerKind};
 use crate::link::{Emulator, EmulatorSettings, MotorOrder, Wheels};
 use crate::lqr;
 use crate::model_file::RobotModel;
+use crate::record::ReplayError;
 use crate::record::recording::About;
 use crate::simulate::SimulationError;
 use hearing::Hearing;
 use link::{Heard, Link};
+use player::Player;
 use publisher::Publisher;
 use tally::Tally;
 use wire::Wire;
@@ -58,11 +64,20 @@ pub enum SessionError {
     /// A recording that cannot be made.
     #[error("{0}")]
     Recording(String),
-    /// Recordings are read as files.
+    /// A recording that cannot be replayed.
+    #[error(transparent)]
+    Replay(#[from] ReplayError),
+    /// A file that cannot be read.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// A recording has no motors.
     #[error(
-        "recordings cannot be replayed yet: open the robot log as a file, or convert it with flqr convert"
+        "a recording can be watched but not driven: give can:INTERFACE, slcan:PORT@BITRATE or emulated in place of {source_name}"
     )]
-    Replay,
+    ReplayDriven {
+        /// The recording.
+        source_name: String,
+    },
     /// The system gives no thread.
     #[error("no thread for the robot: {0}")]
     Thread(#[from] std::io::Error),
@@ -109,10 +124,14 @@ impl Session {
         if let Some(name) = &options.record {
             recording.start(name).map_err(SessionError::Recording)?;
         }
+        let mut hearing = Hearing::new(&options.robot.link);
+        if matches!(options.source, Source::Replay { .. }) {
+            hearing.wheels = hearing.wheels.telling_sent();
+        }
         let worker = Worker {
             link,
             role: role(&options)?,
-            hearing: Hearing::new(&options.robot.link),
+            hearing,
             heard: Heard::default(),
             pacer: Pacer::new(clock, TICK),
             tally: Tally::new(options.source.bit_rate()),
@@ -122,6 +141,10 @@ impl Session {
             publisher: Publisher::new(update_sender, wake),
         };
         let thread = Builder::new().name("control".to_owned()).spawn(move || {
+            // A recording is in no hurry, and must not keep a core from everybody else.
+            if matches!(worker.link, Link::Replay(_)) {
+                return worker.replay();
+            }
             hurry();
             worker.work();
         })?;
@@ -192,7 +215,12 @@ fn open_link(options: &SessionOptions, clock: Clock) -> Result<Link, SessionErro
             };
             Ok(Link::Emulated(Box::new(Emulator::new(&options.robot, settings)?)))
         }
-        Source::Replay { .. } => Err(SessionError::Replay),
+        Source::Replay { .. } if !listens => {
+            Err(SessionError::ReplayDriven { source_name: options.source.to_string() })
+        }
+        Source::Replay { file } => {
+            Ok(Link::Replay(Box::new(Player::open(file, options.replay_speed, clock)?)))
+        }
     }
 }
 

@@ -114,6 +114,13 @@ impl Tally {
         (status.packets, status.corrupted, status.stray_bytes) = (intact, corrupted, stray_bytes);
     }
 
+    /// A row of a recording that is replayed: what its frames do not say where there are none.
+    pub(super) fn replayed(&mut self, row: &Row) {
+        for (motor, temperature_c) in self.motors.iter_mut().zip(row.motor_temperature_c) {
+            motor.status.temperature_c = temperature_c.or(motor.status.temperature_c);
+        }
+    }
+
     /// A row of the recording.
     pub(super) fn row(&self, sample: &Sample) -> Row {
         let [left, right] = &self.motors;

@@ -239,6 +239,24 @@ pub enum EventKind {
     Stop,
 }
 
+impl EventKind {
+    const ALL: [Self; 3] = [Self::Note, Self::Warning, Self::Stop];
+
+    /// Its name in recordings and lines.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Note => "note",
+            Self::Warning => "warning",
+            Self::Stop => "stop",
+        }
+    }
+
+    /// The sort of this name.
+    pub(super) fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.name() == name)
+    }
+}
+
 /// How everything stands.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Status {
@@ -337,7 +355,7 @@ pub struct Counters {
     pub dropped: u64,
     /// Frames and samples that came but did not reach the control loop, a window or a recording.
     pub lost: u64,
-    /// Error frames and damaged lines.
+    /// Error frames, damaged lines of an adapter, and those of a recording that is replayed.
     pub errors: u64,
     /// Ticks of the control loop that came a period late or later.
     pub late: u64,
