@@ -12,7 +12,8 @@ use std::time::Duration;
 use flqr_core::control::drive::Excitation;
 use flqr_core::control::{BalanceController, ControllerKind};
 use flqr_core::device::{
-    Connection, EventKind, Session, SessionMode, SessionOptions, SessionOrder, Source, Update,
+    Connection, Described, EventKind, SerialAddress, Session, SessionMode, SessionOptions, SessionOrder,
+    Source, Update,
 };
 use flqr_core::model_file::{RobotModel, presets};
 use flqr_core::record::{ColumnMap, ReadOptions, Sample, read_log};
@@ -28,6 +29,7 @@ fn options(source: Source, replay_speed: f64) -> SessionOptions {
     SessionOptions {
         source,
         imu: None,
+        dbc: None,
         robot: paper(),
         mode: SessionMode::Listen,
         record: None,
@@ -250,4 +252,93 @@ fn what_cannot_be_replayed_is_named_with_the_mend() {
     let driven = SessionOptions { mode, ..replay(&csv(), 1.0) };
     let error = Session::open(driven, Arc::new(|| {})).err().unwrap().to_string();
     assert!(error.starts_with("a recording can be watched but not driven: give can:INTERFACE"), "{error}");
+}
+
+/// Its degrees are written in Latin-1, as tools of Windows do.
+const DBC: &[u8] = b"VERSION \"1\"\n\nNS_ :\n\nBS_:\n\nBU_: ECU\n\n\
+    BO_ 256 Body: 8 ECU\n \
+    SG_ Lean : 0|16@1- (0.01,0) [0|0] \"\xB0\" ECU\n \
+    SG_ LeanRate : 16|16@1- (0.1,0) [0|0] \"\xB0/s\" ECU\n\n\
+    BO_ 257 Wheels: 8 ECU\n \
+    SG_ SpeedLeft : 0|16@1- (0.1,0) [0|0] \"rpm\" ECU\n \
+    SG_ SpeedRight : 16|16@1- (0.1,0) [0|0] \"rpm\" ECU\n \
+    SG_ TorqueLeft : 32|16@1- (1,0) [0|0] \"mNm\" ECU\n";
+
+/// 0.1 s at 1 kHz: pitch 3 deg at 10 deg/s, the left wheel at 60 rpm with 640 mN m, the right one at -30 rpm.
+fn other_robot(name: &str) -> (PathBuf, PathBuf) {
+    let folder = folder(name);
+    let (frames, dbc) = (folder.join("other.log"), folder.join("other.dbc"));
+    let lines = (0..100)
+        .map(|ms| format!("(7.{ms:03}000) can1 100#2C016400\n(7.{ms:03}200) can1 101#5802D4FE8002\n"));
+    fs::write(&frames, lines.collect::<String>()).unwrap();
+    fs::write(&dbc, DBC).unwrap();
+    (frames, dbc)
+}
+
+fn described(frames: &Path, dbc: &Path, signals: &[&str]) -> SessionOptions {
+    let signals = signals.iter().map(|text| text.parse().unwrap()).collect();
+    let mut options = replay(frames, f64::INFINITY);
+    options.robot.link.torque_constant_nm_a = None;
+    SessionOptions { dbc: Some(Described { file: dbc.to_owned(), signals }), ..options }
+}
+
+const SIGNALS: [&str; 5] = [
+    "pitch=Lean",
+    "pitch_rate=Body.LeanRate",
+    "motor_speed_left=SpeedLeft",
+    "motor_speed_right_rad_s=SpeedRight",
+    "torque_left=TorqueLeft",
+];
+
+#[test]
+fn a_robot_that_a_dbc_file_describes_has_rows() {
+    let (frames, dbc) = other_robot("replay-dbc");
+    let updates = play(described(&frames, &dbc, &SIGNALS));
+    let samples = samples(&updates);
+    assert!((90..=100).contains(&samples.len()), "{}", samples.len());
+    let turn = std::f64::consts::TAU;
+    let last = samples.last().unwrap();
+    for (found, expected) in [
+        (last.pitch_rad, 3_f64.to_radians()),
+        (last.pitch_rate_rad_s, 10_f64.to_radians()),
+        (last.motor_speed_left_rad_s, turn),
+        (last.motor_speed_right_rad_s, -turn / 2.0),
+        (
+            last.motor_angle_left_rad - samples[0].motor_angle_left_rad,
+            turn * (last.time_s - samples[0].time_s),
+        ),
+        // There is no torque constant, and none is needed.
+        (last.torque_left_nm, 0.64),
+        (last.torque_right_nm, 0.0),
+    ] {
+        assert!((found - expected).abs() < 1e-9 + 1e-2 * expected.abs(), "{found} {expected} {last:?}");
+    }
+    let [left, _] = updates.last().unwrap().status.motors;
+    assert_eq!((left.current_a, left.temperature_c), (None, None), "neither is known");
+}
+
+#[test]
+fn what_a_dbc_file_cannot_serve_for_is_named_with_the_mend() {
+    let (frames, dbc) = other_robot("replay-dbc-refused");
+    let refused = |options| Session::open(options, Arc::new(|| {})).err().unwrap().to_string();
+    for (signals, expected) in [
+        (
+            &SIGNALS[..3],
+            "no signal is chosen for the motion of the right motor: add motor_speed_right_rad_s=SIGNAL",
+        ),
+        (
+            &["pitch=Nothing"][..],
+            "other.dbc: the file has no signal Nothing for pitch_rad: choose one of its signals",
+        ),
+    ] {
+        let message = refused(described(&frames, &dbc, signals));
+        assert!(message.contains(expected), "{message}");
+    }
+    let imu = Some(SerialAddress { port: "/dev/null".to_owned(), baud: 9600 });
+    let twice = refused(SessionOptions { imu, ..described(&frames, &dbc, &SIGNALS) });
+    assert!(twice.ends_with("leave one of the two out"), "{twice}");
+    let none = refused(described(&frames, &dbc.with_extension("none"), &SIGNALS));
+    assert!(none.ends_with("other.none: there is no such file: check the path"), "{none}");
+    let noise = refused(described(&frames, &frames, &SIGNALS));
+    assert!(noise.contains("other.log: this is not a DBC file: "), "{noise}");
 }

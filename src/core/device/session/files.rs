@@ -1,7 +1,7 @@
 //! Files that a session reads.
 
 use std::fs::{self, File};
-use std::io::{self, BufRead, BufReader};
+use std::io::{self, BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use crate::record::recording::Names;
@@ -24,7 +24,6 @@ impl FileError {
             io::ErrorKind::NotFound => "there is no such file: check the path".to_owned(),
             io::ErrorKind::PermissionDenied => "the file may not be read: check its permissions".to_owned(),
             io::ErrorKind::IsADirectory => "this is a folder: give a file in it".to_owned(),
-            io::ErrorKind::InvalidData => "this is not text: give the file that was meant".to_owned(),
             _ => format!("cannot read the file: {error}"),
         };
         Self { file: file.to_owned(), problem }
@@ -44,6 +43,16 @@ pub(super) fn open_recording(name: &Path) -> Result<Replay<BufReader<File>>, sup
         names.robot_log == named && fs::metadata(&names.frames).is_ok_and(|about| about.len() > 0);
     let frames = if has_frames { Some(open(&names.frames)?) } else { None };
     Ok(Replay::new(Some(file), frames, None)?)
+}
+
+/// Reads a text file, of a longer one only so many bytes. What is not UTF-8 is taken as Latin-1, in which DBC files
+/// write the sign of degrees.
+pub(super) fn read_text(name: &Path, limit: usize) -> Result<String, FileError> {
+    let mut bytes = Vec::new();
+    let ReplayFile { reader, .. } = open(name)?;
+    reader.take(limit as u64).read_to_end(&mut bytes).map_err(|error| FileError::new(name, &error))?;
+    Ok(String::from_utf8(bytes)
+        .unwrap_or_else(|error| error.as_bytes().iter().map(|byte| char::from(*byte)).collect()))
 }
 
 fn open(path: &Path) -> Result<ReplayFile<BufReader<File>>, FileError> {

@@ -15,12 +15,13 @@ mod worker;
 pub use files::FileError;
 pub use publisher::Waker;
 pub use types::{
-    Connection, Counters, DriveStatus, Event, EventKind, ImuStatus, MotorStatus, RecordingStatus,
+    Connection, Counters, Described, DriveStatus, Event, EventKind, ImuStatus, MotorStatus, RecordingStatus,
     SerialAddress, SerialAddressError, SessionMode, SessionOptions, SessionOrder, Source, SourceError,
     Status, Timing, Update,
 };
 
 use std::collections::VecDeque;
+use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::thread::{Builder, JoinHandle};
 use std::time::{Duration, SystemTime};
@@ -28,13 +29,14 @@ use std::time::{Duration, SystemTime};
 use super::{Clock, OpenError, Pacer, hurry, open_bus, open_imu};
 use crate::control::drive::{Drive, DriveError, DriveSettings, Excitation, Listener};
 use crate::control::{BalanceController, ControlError, ControllerKind};
+use crate::link::dbc::{self, Dbc, SignalMap};
 use crate::link::{Emulator, EmulatorSettings, MotorOrder, Wheels};
 use crate::lqr;
 use crate::model_file::RobotModel;
 use crate::record::ReplayError;
 use crate::record::recording::About;
 use crate::simulate::SimulationError;
-use hearing::Hearing;
+use hearing::{Hearing, Signals};
 use link::{Heard, Link};
 use player::Player;
 use publisher::Publisher;
@@ -78,6 +80,14 @@ pub enum SessionError {
         /// The recording.
         source_name: String,
     },
+    /// A DBC file, or a choice of its signals, that does not serve.
+    #[error("{}: {problem}", file.display())]
+    Dbc {
+        /// The file.
+        file: PathBuf,
+        /// What is wrong, and the mend.
+        problem: String,
+    },
     /// The system gives no thread.
     #[error("no thread for the robot: {0}")]
     Thread(#[from] std::io::Error),
@@ -102,6 +112,8 @@ impl Session {
     /// [`SessionError`]; then nothing is left open.
     pub fn open(options: SessionOptions, wake: Waker) -> Result<Self, SessionError> {
         let clock = Clock::start();
+        let signals = options.dbc.as_ref().map(|described| signals(described, &options)).transpose()?;
+        let mut hearing = Hearing::new(&options.robot.link, signals);
         let (order_sender, orders) = sync_channel(ORDERS);
         let (update_sender, updates) = sync_channel(UPDATES);
         let link = open_link(&options, clock)?;
@@ -124,7 +136,6 @@ impl Session {
         if let Some(name) = &options.record {
             recording.start(name).map_err(SessionError::Recording)?;
         }
-        let mut hearing = Hearing::new(&options.robot.link);
         if matches!(options.source, Source::Replay { .. }) {
             hearing.wheels = hearing.wheels.telling_sent();
         }
@@ -233,9 +244,50 @@ fn on_board(robot: &RobotModel) -> Result<Option<BalanceController>, ControlErro
     gain.map(|design| BalanceController::new(kind, robot, design.gain)).transpose()
 }
 
+/// The chosen signals of a robot that a DBC file describes.
+fn signals(described: &Described, options: &SessionOptions) -> Result<Signals, SessionError> {
+    let refuse = |problem: String| SessionError::Dbc { file: described.file.clone(), problem };
+    if options.mode != SessionMode::Listen {
+        let problem = "a robot that a DBC file describes can be watched only, to be driven it has to speak the LK \
+                       protocol: leave the file out, or listen";
+        return Err(refuse(problem.to_owned()));
+    }
+    let text = files::read_text(&described.file, dbc::LARGEST_FILE_BYTES + 1)?;
+    let file = Dbc::parse(&text).map_err(|error| refuse(error.to_string()))?;
+    let constant_nm_a = torque_constant(options);
+    let map = SignalMap::new(&file, &described.signals, constant_nm_a);
+    let map = map.map_err(|error| refuse(error.to_string()))?;
+    if let Some(motor) = map.missing_motor() {
+        return Err(refuse(format!(
+            "no signal is chosen for the motion of the {motor} motor: add motor_speed_{motor}_rad_s=SIGNAL or \
+             motor_angle_{motor}_rad=SIGNAL"
+        )));
+    }
+    if map.has_pitch() && options.imu.is_some() {
+        let problem = "the pitch is to come from its signals and from the IMU: leave one of the two out";
+        return Err(refuse(problem.to_owned()));
+    }
+    Ok(Signals { map, tells_current: options.robot.link.torque_constant_nm_a.is_some() })
+}
+
+/// Torque constant, N m/A. A robot that a DBC file describes tells torques: without a constant, each ampere that they
+/// are turned into is one newton metre.
+fn torque_constant(options: &SessionOptions) -> f64 {
+    options.robot.link.torque_constant_nm_a.unwrap_or(1.0)
+}
+
+fn listener(options: &SessionOptions) -> Listener {
+    if options.dbc.is_none() {
+        return Listener::new(&options.robot);
+    }
+    let mut robot = options.robot.clone();
+    robot.link.torque_constant_nm_a = Some(torque_constant(options));
+    Listener::new(&robot)
+}
+
 fn role(options: &SessionOptions) -> Result<Role, DriveError> {
     Ok(match &options.mode {
-        SessionMode::Listen => Role::Listen(Box::new(Listener::new(&options.robot))),
+        SessionMode::Listen => Role::Listen(Box::new(listener(options))),
         SessionMode::Drive { controller, excitation } => Role::Drive(Box::new(Drive::new(
             &options.robot,
             **controller,

@@ -71,8 +71,10 @@ impl Tally {
                 tally.heard = Some(state.time);
                 tally.rate.add(state.time, 1.0);
                 tally.answered += 1;
-                tally.status.temperature_c = Some(state.temperature_c);
-                tally.status.current_a = Some(state.current_a);
+                // Either may not be known of a robot that a DBC file describes.
+                let known = |value: f64| Some(value).filter(|value| value.is_finite());
+                tally.status.temperature_c = known(state.temperature_c);
+                tally.status.current_a = known(state.current_a);
             }
             MotorEvent::Health(motor, health) => {
                 let tally = &mut self.motors[*motor as usize];

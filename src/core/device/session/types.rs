@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use crate::control::BalanceController;
 use crate::control::drive::{Check, DriveOrder, Excitation, Stage};
+use crate::link::dbc::Choice;
 use crate::link::{MotorHealth, StampedFrame};
 use crate::model_file::RobotModel;
 use crate::record::Sample;
@@ -158,6 +159,15 @@ impl SessionMode {
     }
 }
 
+/// A robot whose frames a DBC file describes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Described {
+    /// The DBC file.
+    pub file: PathBuf,
+    /// Which of its signals are what.
+    pub signals: Vec<Choice>,
+}
+
 /// What a session is opened with.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SessionOptions {
@@ -165,6 +175,8 @@ pub struct SessionOptions {
     pub source: Source,
     /// IMU on a serial port of its own; an emulated or replayed robot has its IMU with it.
     pub imu: Option<SerialAddress>,
+    /// Another robot than one with LK motors and a JY901; it can be watched only.
+    pub dbc: Option<Described>,
     /// The robot.
     pub robot: RobotModel,
     /// Whether anything may be sent.

@@ -318,7 +318,8 @@ impl Worker {
         }
         match self.hearing.ids() {
             Some(ids) => format!(
-                "frames of {ids} are heard, but none of the robot's motors: check left_motor_id and right_motor_id in [link]"
+                "frames of {ids} are heard, but {}",
+                self.hearing.wanted()
             ),
             None => "nothing is heard: motors answer only when they are asked, by the robot's own controller or while \
                      checking; check supply, wiring, termination and bit rate"
