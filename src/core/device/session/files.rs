@@ -36,7 +36,7 @@ pub(super) fn open_recording(name: &Path) -> Result<Replay<BufReader<File>>, sup
     let names = Names::new(name);
     let named = if name.extension().is_none() && !name.exists() { &names.robot_log } else { name };
     let mut file = open(named)?;
-    if begins_with_frame(&mut file.reader) {
+    if holds_frames(&mut file.reader, named) {
         return Ok(Replay::new(None, Some(file), start_beside(&names, named))?);
     }
     let has_frames =
@@ -64,9 +64,12 @@ fn open(path: &Path) -> Result<ReplayFile<BufReader<File>>, FileError> {
     Ok(ReplayFile { name: path.display().to_string(), reader: BufReader::with_capacity(BUFFER, file) })
 }
 
-/// Whether this is raw frames; a reader that fails now will fail again when it is read.
-fn begins_with_frame(reader: &mut impl BufRead) -> bool {
-    reader.fill_buf().is_ok_and(|text| text.trim_ascii_start().starts_with(b"("))
+/// Whether this is raw frames, of an empty file by its name; a reader that fails now will fail again when it is read.
+fn holds_frames(reader: &mut impl BufRead, name: &Path) -> bool {
+    reader.fill_buf().is_ok_and(|text| match text {
+        [] => name.extension().is_some_and(|ending| ending == "log"),
+        text => text.trim_ascii_start().starts_with(b"("),
+    })
 }
 
 /// What times count from in the robot log beside raw frames, where there is one.

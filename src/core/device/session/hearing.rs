@@ -16,8 +16,8 @@ const MOST_IDS: usize = 12;
 /// What a DBC file tells of the frames.
 pub(super) struct Signals {
     pub(super) map: SignalMap,
-    /// Whether currents are known; otherwise those of the map are torques.
-    pub(super) tells_current: bool,
+    /// Of which motors currents are known; the others' stand for torques, or for nothing.
+    pub(super) tells_current: [bool; 2],
 }
 
 /// Decoders of both lines, and what they gave since it was last cleared.
@@ -80,8 +80,8 @@ impl Hearing {
                 Heard::Motor(event) => {
                     self.motors.push(event);
                     let mut shown = event;
-                    if let MotorEvent::State(_, state) = &mut shown
-                        && !*tells_current
+                    if let MotorEvent::State(motor, state) = &mut shown
+                        && !tells_current[*motor as usize]
                     {
                         state.current_a = f64::NAN;
                     }

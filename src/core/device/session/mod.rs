@@ -35,6 +35,7 @@ use crate::lqr;
 use crate::model_file::RobotModel;
 use crate::record::ReplayError;
 use crate::record::recording::About;
+use crate::robot::Motor;
 use crate::simulate::SimulationError;
 use hearing::{Hearing, Signals};
 use link::{Heard, Link};
@@ -267,7 +268,9 @@ fn signals(described: &Described, options: &SessionOptions) -> Result<Signals, S
         let problem = "the pitch is to come from its signals and from the IMU: leave one of the two out";
         return Err(refuse(problem.to_owned()));
     }
-    Ok(Signals { map, tells_current: options.robot.link.torque_constant_nm_a.is_some() })
+    let has_constant = options.robot.link.torque_constant_nm_a.is_some();
+    let tells_current = Motor::BOTH.map(|motor| has_constant && map.has_torque(motor));
+    Ok(Signals { map, tells_current })
 }
 
 /// Torque constant, N m/A. A robot that a DBC file describes tells torques: without a constant, each ampere that they

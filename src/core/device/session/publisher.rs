@@ -59,20 +59,17 @@ impl Publisher {
     /// Sends an update; gives the number of samples that did not get through because nobody takes them.
     /// Events wait for the next one.
     pub(super) fn publish(&mut self, status: Status) -> u64 {
-        match self.send(status) {
-            Ok(()) => 0,
-            Err(update) => {
-                self.events = update.events;
-                update.samples.len() as u64
-            }
-        }
+        self.send(status).map_or(0, |update| {
+            self.events = update.events;
+            update.samples.len() as u64
+        })
     }
 
     /// Sends an update; where nobody takes it, all of it waits for the next one.
     pub(super) fn offer(&mut self, status: Status) {
-        let sent = self.send(status);
-        self.held = sent.is_err();
-        if let Err(update) = sent {
+        let refused = self.send(status);
+        self.held = refused.is_some();
+        if let Some(update) = refused {
             (self.samples, self.frames, self.events) = (update.samples, update.frames.into(), update.events);
         }
     }
@@ -82,7 +79,8 @@ impl Publisher {
         self.held
     }
 
-    fn send(&mut self, status: Status) -> Result<(), Update> {
+    /// Sends an update; gives it back where nobody takes it.
+    fn send(&mut self, status: Status) -> Option<Update> {
         let update = Update {
             samples: std::mem::take(&mut self.samples),
             frames: std::mem::take(&mut self.frames).into(),
@@ -92,9 +90,9 @@ impl Publisher {
         match self.updates.try_send(update) {
             Ok(()) => {
                 (self.wake)();
-                Ok(())
+                None
             }
-            Err(TrySendError::Full(update) | TrySendError::Disconnected(update)) => Err(update),
+            Err(TrySendError::Full(update) | TrySendError::Disconnected(update)) => Some(update),
         }
     }
 }

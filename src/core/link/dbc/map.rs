@@ -117,6 +117,11 @@ impl SignalMap {
         self.pitch.has.contains(&true)
     }
 
+    /// Whether a motor's torque is chosen.
+    pub fn has_torque(&self, motor: Motor) -> bool {
+        self.sources.iter().any(|source| source.quantity == Quantity::Torque(motor))
+    }
+
     /// A motor of which neither angle nor speed is chosen.
     pub fn missing_motor(&self) -> Option<Motor> {
         Motor::BOTH.into_iter().find(|motor| !self.motors[*motor as usize].motion.has.contains(&true))

@@ -228,6 +228,8 @@ fn motors_of_which_nothing_moves_are_named() {
     let both = ["motor_speed_left=LeftSpeed", "motor_angle_right=Floats.Single"];
     assert_eq!(missing(&both), None);
     let has_pitch = |texts: &[&str]| SignalMap::new(&dbc(), &choices(texts), 1.0).unwrap().has_pitch();
+    let torque = SignalMap::new(&dbc(), &choices(&["torque_left=LeftTorque"]), 1.0).unwrap();
+    assert_eq!(Motor::BOTH.map(|motor| torque.has_torque(motor)), [true, false]);
     assert!(!has_pitch(&both) && has_pitch(&["pitch_rate=Rate"]));
 }
 
