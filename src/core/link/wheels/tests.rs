@@ -348,3 +348,21 @@ fn commands_of_two_kinds_are_answered_apart() {
         assert_eq!(command, echo[0]);
     }
 }
+
+#[test]
+fn of_a_recording_torques_that_were_sent_are_told_too() {
+    let sent = stamped(1.0, Direction::Sent, 0x141, torque(200));
+    let together = stamped(2.0, Direction::Sent, 0x280, [100, 0, 100, 0, 0, 0, 0, 0]);
+    let asked = |wheels: &mut Wheels, frame: &StampedFrame| wheels.receive(frame).count();
+    let mut live = Wheels::new(&sixteen_turns());
+    let mut replayed = Wheels::new(&sixteen_turns()).telling_sent();
+    assert_eq!([asked(&mut live, &sent), asked(&mut live, &together)], [0, 0]);
+    let [event] = replayed.receive(&sent).collect::<Vec<_>>()[..] else { panic!("one event") };
+    let MotorEvent::Asked { motor: Motor::Left, current_a, .. } = event else { panic!("{event:?}") };
+    assert!((current_a - 200.0 * 33.0 / 4096.0).abs() < 1e-12, "{current_a} A");
+    assert_eq!(asked(&mut replayed, &together), 2);
+    // What follows is its reply, and no command of somebody else.
+    let reply = reply(0xA1, state(30, 200, 10, 77));
+    let told: Vec<_> = replayed.receive(&received(2.2, 0x141, reply)).collect();
+    assert!(matches!(told[..], [MotorEvent::State(Motor::Left, _)]), "{told:?}");
+}
