@@ -2,7 +2,7 @@
 
 use egui::{Event, Frame, Key, KeyboardShortcut, Margin, Modifiers, Panel, RichText, Theme, Ui};
 
-use flqr_core::device::SessionOrder;
+use flqr_core::device::{Connection, SessionOrder};
 
 use super::{App, Tab};
 use crate::command::{Command, FilePurpose, Source};
@@ -206,12 +206,16 @@ impl App {
     /// How the source stands, what was lost of it, and what that means.
     fn source_text(&self) -> (String, String, &'static str) {
         if self.source != Source::Simulated {
-            let state = if self.link.is_open() { "connected" } else { "disconnected" };
+            let state = match (&self.link.status, self.link.is_open()) {
+                (_, false) => "disconnected",
+                (Some(status), true) if status.connection == Connection::Ended => "ended",
+                _ => "connected",
+            };
             let counters = self.link.status.as_ref().map(|status| status.counters).unwrap_or_default();
             return (
                 format!("{}: {state}", self.source.name()),
                 format!("late {}   lost {}   dropped {}", counters.late, counters.lost, counters.dropped),
-                "Readings that came after their tick, frames that did not reach the window or the recording, and frames dropped by the system or the adapter",
+                "Ticks of the control loop that came a period late, frames and samples that did not reach the loop, the window or the recording, and frames dropped by the system or the adapter",
             );
         }
         let live = &self.live.status;

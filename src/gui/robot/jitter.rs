@@ -19,7 +19,7 @@ const LABELLED: [(f64, &str); 5] =
 pub(super) fn jitter_ui(timing: &Timing, ui: &mut Ui) {
     title_ui(ui, "Loop jitter");
     if timing.ticks == 0 {
-        hint_ui(ui, "The control loop has not ticked yet: it ticks in a session that may drive.");
+        hint_ui(ui, "No control loop has ticked: a recording has none.");
         return;
     }
     let color = (timing.skipped > 0).then(|| palette(ui.visuals()).warning);

@@ -726,9 +726,11 @@ fn a_recording_is_replayed_to_its_end() {
     assert_eq!((&ended["robot_tab"]["rows"], &ended["robot_tab"]["skipped_rows"]), (&300.into(), &0.into()));
     assert!((ended["robot_tab"]["end_s"].as_f64().unwrap() - 0.299).abs() < 1e-9, "{ended:#}");
     assert_eq!(ended["robot_tab"]["last_event"], "the recording has come to its end: 300 rows and 0 frames");
-    window.get_by_label_contains("the recording has come to its end");
+    window.get_by_label("the recording has come to its end");
     // Once more from the form.
     click(&mut window, "Close");
+    until(&mut window, "closing", |s| s["robot_tab"]["session"] == "closed");
+    window.run_steps(2);
     click(&mut window, "Replay");
     until(&mut window, "the end", |s| s["robot_tab"]["connection"] == "ended");
     window.get_by_label("Close");
