@@ -172,9 +172,10 @@ impl RecorderInput {
         self.hand_over(Item::Event(event.time, format!("{}: {}", event.kind.name(), event.text)));
     }
 
-    /// Whether half of the queue is free, for who can wait.
+    /// Whether half of the queue is free, for who can wait; a recording that has ended early takes nothing and holds
+    /// nobody up.
     pub fn has_room(&self) -> bool {
-        self.shared.waiting.load(Ordering::Relaxed) < QUEUE / 2
+        self.shared.waiting.load(Ordering::Relaxed) < QUEUE / 2 || self.shared.status().problem.is_some()
     }
 
     fn hand_over(&self, item: Item) {
@@ -270,7 +271,6 @@ impl Writer {
     fn give_up(self, problem: String, items: &Receiver<Item>) {
         let left = self.pending.iter().sum::<u64>() + items.try_iter().count() as u64;
         self.shared.lost.fetch_add(left, Ordering::Relaxed);
-        self.shared.waiting.store(0, Ordering::Relaxed);
         self.shared.status().problem = Some(problem);
     }
 }

@@ -130,6 +130,13 @@ impl Host {
         let (motors, imu, works) = self.hear();
         let inputs = Inputs { motors: &motors, imu: &imu, orders, bus_down: !works, late: Duration::ZERO };
         let output = self.drive.step(now, &inputs);
+        for event in &output.events {
+            match event {
+                DriveEvent::Stage(Stage::Stopped(reason)) => self.stop = Some((self.tick, *reason)),
+                DriveEvent::Stage(_) => self.stop = None,
+                DriveEvent::Note(_) | DriveEvent::Warning(_) => {}
+            }
+        }
         for order in output.orders.iter() {
             self.send(order);
         }
@@ -139,11 +146,6 @@ impl Host {
         }
         for event in &output.events {
             push_event(&mut self.rows, now, &event.to_string());
-            match event {
-                DriveEvent::Stage(Stage::Stopped(reason)) => self.stop = Some((self.tick, *reason)),
-                DriveEvent::Stage(_) => self.stop = None,
-                DriveEvent::Note(_) | DriveEvent::Warning(_) => {}
-            }
         }
         self.tick += 1;
     }

@@ -201,7 +201,8 @@ fn at_stage(time_s: f64, stage: Stage, checks: &[(&'static str, CheckResult, &st
         text: (*text).to_owned(),
     };
     let mut update = update(time_s);
-    update.status.drive = Some(DriveStatus { stage, checks: checks.iter().map(check).collect() });
+    update.status.drive =
+        Some(DriveStatus { stage, motors_off: false, checks: checks.iter().map(check).collect() });
     update
 }
 
@@ -824,7 +825,7 @@ fn random_update(seed: &mut u64, time_s: f64) -> Update {
         2 => Stage::Driving,
         _ => Stage::Stopped(StopReason::Tilt { pitch_rad: value }),
     };
-    told.status.drive = Some(DriveStatus { stage, checks: Vec::new() });
+    told.status.drive = Some(DriveStatus { stage, motors_off: false, checks: Vec::new() });
     told.events = (0..number(5))
         .map(|n| Event { time: Duration::MAX, kind: EventKind::Warning, text: "ä".repeat(n as usize * 200) })
         .collect();

@@ -8,7 +8,6 @@ use super::watch::Watch;
 use crate::link::{ImuReading, MotorEvent};
 use crate::model_file::RobotModel;
 use crate::record::Sample;
-use crate::robot::TICK_S;
 
 /// Time after which a sensor that was heard is silent and samples are left out.
 const SILENT: Duration = Duration::from_millis(50);
@@ -42,8 +41,8 @@ impl Listener {
         }
     }
 
-    /// Takes what was heard since the last call, and gives a sample where something new is there and a millisecond
-    /// has passed.
+    /// Takes what was heard since the last call, and gives a sample where something new is there in a
+    /// millisecond that has none yet.
     pub fn hear(&mut self, now: Duration, motors: &[MotorEvent], imu: &[ImuReading]) -> Option<Sample> {
         self.watch.hear(&Inputs { motors, imu, ..Inputs::default() });
         for event in motors {
@@ -62,8 +61,8 @@ impl Listener {
         });
         self.estimator.hear(now, self.watch.states(), Some(pitch));
         let news = motors.iter().any(|event| matches!(event, MotorEvent::State(..))) || !imu.is_empty();
-        let soon =
-            self.last_sample.is_some_and(|last| now.saturating_sub(last).as_secs_f64() < 0.999 * TICK_S);
+        // Whole milliseconds, so that a tick that comes early after a late one still counts.
+        let soon = self.last_sample.is_some_and(|last| now.as_millis() <= last.as_millis());
         if !news || soon || self.is_silent(now) {
             return None;
         }

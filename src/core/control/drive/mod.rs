@@ -197,9 +197,12 @@ impl Drive {
     }
 
     fn release(&mut self, output: &mut Output) {
-        if let Some(motor) = self.switching.take().and_then(|switching| switching.missing()) {
-            let text = format!("the {motor} motor has never said that it is off: switch its supply off");
+        if let Some(motor) = self.switching.as_ref().and_then(Switching::missing) {
+            let text = format!(
+                "not released, because the {motor} motor has not said that it is off: switch its supply off, or disconnect"
+            );
             output.events.push(DriveEvent::Warning(text));
+            return;
         }
         self.reach(Stage::Listening, output);
     }

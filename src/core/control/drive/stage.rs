@@ -95,6 +95,31 @@ pub enum StopReason {
         /// For how long, s.
         silent_s: f64,
     },
+    /// No voltage and errors of a motor that still tells its motion.
+    #[error(
+        "the {motor} motor has told neither voltage nor errors for {silent_s:.1} s: look at its firmware and the bus load"
+    )]
+    HealthSilent {
+        /// Which.
+        motor: Motor,
+        /// For how long, s.
+        silent_s: f64,
+    },
+    /// A silence over which a motor may have turned by any number of turns.
+    #[error(
+        "the {motor} motor was silent for so long that its turns are not known: set motor_timeout_s in [safety] to at \
+         most 0.06"
+    )]
+    TurnsLost {
+        /// Which.
+        motor: Motor,
+    },
+    /// Torques that are not ours.
+    #[error("another controller commands the {motor} motor: switch it off")]
+    OtherController {
+        /// Which.
+        motor: Motor,
+    },
     /// Error bits.
     #[error("the {motor} motor reports {errors}")]
     MotorError {
@@ -183,6 +208,9 @@ impl StopReason {
             Self::ImuSilent { .. } => "imu_silent",
             Self::ImuFrozen { .. } => "imu_frozen",
             Self::MotorSilent { .. } => "motor_silent",
+            Self::HealthSilent { .. } => "health_silent",
+            Self::TurnsLost { .. } => "turns_lost",
+            Self::OtherController { .. } => "other_controller",
             Self::MotorError { .. } => "motor_error",
             Self::MotorOff { .. } => "motor_off",
             Self::MotorHot { .. } => "motor_hot",

@@ -15,14 +15,21 @@ const LEAST_EQUAL_READINGS: u32 = 5;
 /// Time over which the IMU's rate is counted, and the most readings in it.
 const RATE_WINDOW: Duration = Duration::from_secs(1);
 const MOST_READINGS: usize = 2048;
+/// Longest time without a motor's voltage and errors, which are asked for every 0.2 s.
+const HEALTH_TIMEOUT: Duration = Duration::from_millis(700);
+/// Time within which two commands that are not ours tell of another controller; a single one may be a damaged reply.
+const COMMANDED_TWICE: Duration = Duration::from_millis(100);
 
 /// What was heard of one motor, and when.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct MotorWatch {
     pub(super) state: Option<MotorState>,
     pub(super) health: Option<MotorHealth>,
-    /// When another controller was heard to command it.
+    /// When another controller was heard to command it, and the time before.
     pub(super) commanded: Option<Duration>,
+    commanded_before: Option<Duration>,
+    /// When it was heard again after a silence over which its turns cannot be known.
+    turns_lost: Option<Duration>,
 }
 
 /// What was heard of the IMU, and when.
@@ -78,8 +85,12 @@ impl Watch {
                 }
             }
             MotorEvent::Health(motor, health) => self.motors[motor as usize].health = Some(health),
-            MotorEvent::Asked { motor, time, .. } => self.motors[motor as usize].commanded = Some(time),
-            MotorEvent::Acknowledged { .. } | MotorEvent::TurnsLost { .. } => {}
+            MotorEvent::Asked { motor, time, .. } => {
+                let watch = &mut self.motors[motor as usize];
+                watch.commanded_before = watch.commanded.replace(time);
+            }
+            MotorEvent::TurnsLost { motor, time, .. } => self.motors[motor as usize].turns_lost = Some(time),
+            MotorEvent::Acknowledged { .. } => {}
         }
     }
 
@@ -124,11 +135,23 @@ impl MotorWatch {
         if silent_s > limits.motor_timeout_s {
             return Some(StopReason::MotorSilent { motor, silent_s });
         }
+        if self.turns_lost.is_some_and(|time| time > on_since) {
+            return Some(StopReason::TurnsLost { motor });
+        }
+        if let Some((last, before)) = self.commanded.zip(self.commanded_before)
+            && before > on_since
+            && last < before + COMMANDED_TWICE
+        {
+            return Some(StopReason::OtherController { motor });
+        }
         let temperature_c = self.temperature_c().unwrap_or(0.0);
         if temperature_c > limits.temperature_c {
             return Some(StopReason::MotorHot { motor, temperature_c });
         }
         let health = self.health?;
+        if now > health.time.max(on_since) + HEALTH_TIMEOUT {
+            return Some(StopReason::HealthSilent { motor, silent_s: age_s(now, health.time) });
+        }
         if !health.errors.is_none() {
             return Some(StopReason::MotorError { motor, errors: health.errors });
         }

@@ -53,9 +53,18 @@ impl Link {
         }
     }
 
-    /// The motors have torque from now on, or not any more; `false` where that could not be told.
-    pub(super) fn note_driving(&self, driving: bool) -> bool {
-        if let Self::Wire(wire) = self { wire.note_driving(driving) } else { true }
+    /// Tells the sending thread whether the motors may have torque.
+    pub(super) fn set_hot(&self, hot: bool) {
+        if let Self::Wire(wire) = self {
+            wire.set_hot(hot);
+        }
+    }
+
+    /// Frames that still wait are not sent any more.
+    pub(super) fn forget_waiting(&self) {
+        if let Self::Wire(wire) = self {
+            wire.forget_waiting();
+        }
     }
 
     /// Orders to the robot behind the link.

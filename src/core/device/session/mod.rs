@@ -6,6 +6,7 @@ mod link;
 mod player;
 mod publisher;
 mod rate;
+mod recording;
 mod replaying;
 mod tally;
 mod types;
@@ -41,9 +42,10 @@ use hearing::{Hearing, Signals};
 use link::{Heard, Link};
 use player::Player;
 use publisher::Publisher;
+use recording::Recording;
 use tally::Tally;
 use wire::Wire;
-use worker::{Recording, Role, TICK, Worker};
+use worker::{Role, TICK, Worker};
 
 /// Orders and updates that wait for the other side.
 const ORDERS: usize = 64;
@@ -118,22 +120,19 @@ impl Session {
         let (order_sender, orders) = sync_channel(ORDERS);
         let (update_sender, updates) = sync_channel(UPDATES);
         let link = open_link(&options, clock)?;
-        let mut recording = Recording {
-            recorder: None,
-            input: None,
-            about: About {
-                source: options.source.to_string(),
-                interface: options.source.interface(),
-                start: clock.epoch().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default(),
-            },
-            bench: matches!(
-                options.mode,
-                SessionMode::Drive {
-                    excitation: Excitation::SpeedSweep { .. } | Excitation::Multisine { .. },
-                    ..
-                }
-            ),
+        let about = About {
+            source: options.source.to_string(),
+            interface: options.source.interface(),
+            start: clock.epoch().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default(),
         };
+        let bench = matches!(
+            options.mode,
+            SessionMode::Drive {
+                excitation: Excitation::SpeedSweep { .. } | Excitation::Multisine { .. },
+                ..
+            }
+        );
+        let mut recording = Recording::new(about, bench);
         if let Some(name) = &options.record {
             recording.start(name).map_err(SessionError::Recording)?;
         }
@@ -157,8 +156,7 @@ impl Session {
             if matches!(worker.link, Link::Replay(_)) {
                 return worker.replay();
             }
-            hurry();
-            worker.work();
+            worker.work(hurry());
         })?;
         Ok(Self { orders: Some(order_sender), waiting: VecDeque::new(), updates, thread: Some(thread) })
     }

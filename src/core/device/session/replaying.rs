@@ -138,6 +138,7 @@ impl Worker {
 
     fn offer(&mut self) {
         let now = self.position();
+        self.poll_recording(now);
         let status = self.status(now);
         self.publisher.offer(status);
     }

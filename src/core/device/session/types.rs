@@ -314,6 +314,8 @@ pub enum Connection {
 pub struct DriveStatus {
     /// How far it is from being driven.
     pub stage: Stage,
+    /// Whether the motors are off and have said so, or were never switched on.
+    pub motors_off: bool,
     /// What has to be right before that.
     pub checks: Vec<Check>,
 }

@@ -1,27 +1,28 @@
 //! The control loop's thread: everything that was heard goes in, everything that is sent or shown comes out.
 
 use std::ops::ControlFlow;
-use std::path::Path;
 use std::sync::mpsc::{Receiver, TryRecvError};
 use std::time::Duration;
 
 use super::hearing::Hearing;
 use super::link::{Heard, Link};
 use super::publisher::Publisher;
+use super::recording::Recording;
 use super::tally::Tally;
 use super::types::{Connection, DriveStatus, Event, EventKind, SessionOrder, Status, Timing};
 use crate::control::drive::{Drive, DriveEvent, DriveOrder, Inputs, Listener, Output, Stage};
-use crate::device::{Pacer, Recorder, RecorderInput};
-use crate::link::{Direction, MotorOrder, StampedFrame};
+use crate::device::{Pacer, Priority, Recorder};
+use crate::link::{Direction, MotorEvent, MotorOrder, StampedFrame};
 use crate::record::Sample;
-use crate::record::recording::{About, Row};
+use crate::record::recording::Row;
 
 /// Period of the control loop.
 pub(super) const TICK: Duration = Duration::from_millis(1);
 /// Silence after which something is said of it.
 const SILENT: Duration = Duration::from_secs(1);
-/// Longest time for which the motors are told to switch off when a session ends.
-const FAREWELL: Duration = Duration::from_millis(300);
+/// Longest time for which the motors are told to switch off when a session ends; an adapter that was lost needs some to
+/// come back.
+const FAREWELL: Duration = Duration::from_secs(2);
 
 /// What the samples are made by.
 pub(super) enum Role {
@@ -43,48 +44,12 @@ pub(super) struct Worker {
     pub(super) publisher: Publisher,
 }
 
-/// The recording, if one is made.
-pub(super) struct Recording {
-    pub(super) recorder: Option<Recorder>,
-    pub(super) input: Option<RecorderInput>,
-    pub(super) about: About,
-    /// Whether bench logs belong to it.
-    pub(super) bench: bool,
-}
-
-impl Recording {
-    pub(super) fn start(&mut self, name: &Path) -> Result<(), String> {
-        if self.recorder.is_some() {
-            return Err("a recording is being made already: end it first".to_owned());
-        }
-        let recorder = Recorder::start(name, &self.about, self.bench).map_err(|error| error.to_string())?;
-        self.input = Some(recorder.input());
-        self.recorder = Some(recorder);
-        Ok(())
-    }
-
-    /// Whether rows and frames would soon be lost.
-    pub(super) fn is_behind(&self) -> bool {
-        self.input.as_ref().is_some_and(|input| !input.has_room())
-    }
-
-    pub(super) fn end(&mut self) -> Option<String> {
-        self.input = None;
-        let status = self.recorder.take()?.finish();
-        Some(status.problem.unwrap_or_else(|| {
-            format!(
-                "{}: {} rows and {} frames were recorded",
-                status.file.display(),
-                status.rows,
-                status.frames
-            )
-        }))
-    }
-}
-
 impl Worker {
     /// Until the session's handle is dropped.
-    pub(super) fn work(mut self) {
+    pub(super) fn work(mut self, priority: Priority) {
+        if let (Priority::Usual(reason), Role::Drive(_)) = (priority, &self.role) {
+            self.note(self.pacer.now(), EventKind::Warning, reason);
+        }
         loop {
             let tick = self.pacer.wait();
             if self.take_orders(tick.due).is_break() {
@@ -105,26 +70,15 @@ impl Worker {
         loop {
             match self.orders.try_recv() {
                 Ok(SessionOrder::Drive(order)) => self.drive_orders.push(order),
-                Ok(SessionOrder::Record(name)) => self.record(now, name.as_deref()),
+                Ok(SessionOrder::Record(name)) => {
+                    if let Err(problem) = self.recording.order(name) {
+                        self.note(now, EventKind::Warning, problem);
+                    }
+                }
                 Ok(SessionOrder::Interval(interval)) => self.publisher.interval = interval,
                 Ok(order) => self.link.order(&order),
                 Err(TryRecvError::Empty) => return ControlFlow::Continue(()),
                 Err(TryRecvError::Disconnected) => return ControlFlow::Break(()),
-            }
-        }
-    }
-
-    fn record(&mut self, now: Duration, name: Option<&Path>) {
-        match name {
-            Some(name) => {
-                if let Err(problem) = self.recording.start(name) {
-                    self.note(now, EventKind::Warning, problem);
-                }
-            }
-            None => {
-                if let Some(text) = self.recording.end() {
-                    self.note(now, EventKind::Note, text);
-                }
             }
         }
     }
@@ -174,11 +128,24 @@ impl Worker {
 
     /// The sample of what has been heard by `now`.
     pub(super) fn sample(&mut self, now: Duration) {
+        self.tell_lost_turns();
         let Role::Listen(listener) = &mut self.role else { return };
         let sample = listener.hear(now, &self.hearing.motors, &self.hearing.imu);
         self.hearing.clear();
         if let Some(sample) = sample {
             self.keep(sample);
+        }
+    }
+
+    fn tell_lost_turns(&mut self) {
+        for index in 0..self.hearing.motors.len() {
+            if let MotorEvent::TurnsLost { motor, time, silent } = self.hearing.motors[index] {
+                let silent_s = silent.as_secs_f64();
+                let text = format!(
+                    "the {motor} motor was silent for {silent_s:.2} s: its angle and the way go on from where they were"
+                );
+                self.note(time, EventKind::Warning, text);
+            }
         }
     }
 
@@ -218,19 +185,21 @@ impl Worker {
             late,
         };
         let output = drive.step(now, &inputs);
-        let driving = drive.stage() == Stage::Driving;
+        let hot = match drive.stage() {
+            Stage::Listening | Stage::Checking => false,
+            Stage::Driving | Stage::Stopped(_) => !drive.has_ended(),
+        };
         self.drive_orders.clear();
-        self.obey(now, &output, driving);
+        self.link.set_hot(hot);
+        self.obey(now, &output);
     }
 
-    fn obey(&mut self, now: Duration, output: &Output, driving: bool) {
-        let told = self.link.note_driving(driving);
+    fn obey(&mut self, now: Duration, output: &Output) {
+        if output.events.iter().any(|event| matches!(event, DriveEvent::Stage(Stage::Stopped(_)))) {
+            self.link.forget_waiting();
+        }
         for order in output.orders.iter() {
             self.send(now, order);
-        }
-        // Without the sending thread's watch nobody would switch off after this one.
-        if !told && driving {
-            self.drive_orders.push(DriveOrder::Stop);
         }
         if let Some(sample) = output.sample {
             self.keep(sample);
@@ -269,7 +238,15 @@ impl Worker {
         self.publisher.events.push(event);
     }
 
+    /// Tells what has come of an order to begin or to end a recording.
+    pub(super) fn poll_recording(&mut self, now: Duration) {
+        if let Some((kind, text)) = self.recording.poll() {
+            self.note(now, kind, text);
+        }
+    }
+
     fn publish(&mut self, now: Duration) {
+        self.poll_recording(now);
         let status = self.status(now);
         let lost = self.publisher.publish(status);
         self.tally.lost(lost);
@@ -284,9 +261,11 @@ impl Worker {
             connection: self.connection(now),
             drive: match &self.role {
                 Role::Listen(_) => None,
-                Role::Drive(drive) => {
-                    Some(DriveStatus { stage: drive.stage(), checks: drive.checks().to_vec() })
-                }
+                Role::Drive(drive) => Some(DriveStatus {
+                    stage: drive.stage(),
+                    motors_off: drive.has_ended(),
+                    checks: drive.checks().to_vec(),
+                }),
             },
             motors: self.tally.motor_status(now),
             imu: self.tally.imu_status(now),
