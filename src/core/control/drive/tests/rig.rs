@@ -38,6 +38,12 @@ pub(super) enum Fault {
     Late(f64),
     /// Orders are not heard.
     Deaf,
+    /// A motor tells neither voltage nor errors.
+    HealthSilent(Motor),
+    /// A motor's turns are not known any more.
+    TurnsLost(Motor),
+    /// Somebody else commands a motor, too.
+    Commanded(Motor),
 }
 
 pub(super) struct Rig {
@@ -195,6 +201,19 @@ impl Rig {
                 if let MotorEvent::State(motor, _) = *event {
                     *event = self.state(motor, &readings);
                 }
+            }
+        }
+        motors.retain(|event| match *event {
+            MotorEvent::Health(motor, _) => self.faulty(|f| *f == Fault::HealthSilent(motor)).is_none(),
+            _ => true,
+        });
+        let time = self.now();
+        for motor in Motor::BOTH {
+            if self.faulty(|f| *f == Fault::TurnsLost(motor)).is_some() {
+                motors.push(MotorEvent::TurnsLost { motor, time, silent: Duration::from_millis(61) });
+            }
+            if self.faulty(|f| *f == Fault::Commanded(motor)).is_some() {
+                motors.push(MotorEvent::Asked { motor, time, current_a: 0.1 });
             }
         }
         let late = match self.faulty(|f| matches!(f, Fault::Late(_))) {

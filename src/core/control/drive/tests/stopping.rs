@@ -42,6 +42,9 @@ fn each_watch_fires_within_its_time_and_a_tick() {
         (Fault::NotFinite, "not_finite", 0.0, 0.002),
         (Fault::BusDown, "bus_down", 0.0, 0.0),
         (Fault::Late(0.0201), "late", 0.0, 0.0),
+        (Fault::HealthSilent(Motor::Left), "health_silent", 0.7 - 0.202, 0.702),
+        (Fault::TurnsLost(Motor::Right), "turns_lost", 0.0, 0.001),
+        (Fault::Commanded(Motor::Left), "other_controller", 0.001, 0.002),
     ] {
         for offset in [0, 3, 7, 9] {
             let (mut rig, armed) = armed(1);
