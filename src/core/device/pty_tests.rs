@@ -196,6 +196,20 @@ fn an_adapter_that_cannot_listen_is_never_opened_for_sending() {
     let adapter = Adapter::start(pty.far.try_clone_native().unwrap(), manners, Vec::new());
     let refused = open(pty.name(), true, &clock).err().unwrap();
     assert_eq!(refused, OpenError::Refused { port: pty.name(), command: "L".to_owned() });
+    // An adapter that is slow to close may refuse the next command, so it is tried again.
+    assert_eq!(adapter.heard().1, b"C\rS8\rL\rC\rS8\rL\rC\rS8\rL\rC\r");
+    fs::remove_file(&pty.link).unwrap();
+}
+
+/// The answer to whoever closed the adapter before, which nobody has read, is not taken for an answer to us.
+#[test]
+fn answers_to_those_before_are_let_go() {
+    let (mut pty, clock) = (Pty::new(), Clock::start());
+    pty.far.write_all(b"\rt1412").unwrap();
+    let manners: Manners =
+        |command| Some(if *command == Command::Close { Answer::Refused } else { Answer::Done });
+    let adapter = Adapter::start(pty.far.try_clone_native().unwrap(), manners, Vec::new());
+    drop(open(pty.name(), true, &clock).unwrap());
     assert_eq!(adapter.heard().1, b"C\rS8\rL\rC\r");
     fs::remove_file(&pty.link).unwrap();
 }

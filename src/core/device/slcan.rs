@@ -18,6 +18,12 @@ const BAUD: u32 = 115_200;
 /// Time that an adapter has for an answer. Some never answer.
 const ANSWER_TIME: Duration = Duration::from_millis(100);
 
+/// Time for which all that comes after closing is let go: answers to whoever had the port before, and their frames.
+const SETTLE_TIME: Duration = Duration::from_millis(50);
+
+/// Times that an adapter is opened before it is taken to refuse: it may be slower than the pause after closing.
+const TRIES: u32 = 3;
+
 /// Most bytes of one read: a full bus sends 180 bytes a millisecond.
 const CHUNK: usize = 8192;
 
@@ -67,12 +73,15 @@ pub(super) fn open(
         waiting: 0..0,
     };
     let mut answers = false;
-    for command in commands {
-        let answer = reader.ask(&command).map_err(failed)?;
-        answers |= answer.is_some();
-        // An adapter that is closed already may refuse to be closed.
-        if answer == Some(Answer::Refused) && command != Command::Close {
-            return Err(OpenError::Refused { port: name.to_owned(), command: words(&command) });
+    for tries_left in (0..TRIES).rev() {
+        let (refused, answered) = reader.set_up(&commands).map_err(failed)?;
+        answers = answered;
+        match refused {
+            None => break,
+            Some(command) if tries_left == 0 => {
+                return Err(OpenError::Refused { port: name.to_owned(), command: words(command) });
+            }
+            Some(_) => {}
         }
     }
     health.set_hint(hint(name, bit_rate, answers));
@@ -99,6 +108,36 @@ fn words(command: &Command) -> String {
 }
 
 impl Reader {
+    /// Sends the commands in turn: the one that was refused, if any, and whether any was answered.
+    fn set_up<'a>(&mut self, commands: &'a [Command]) -> io::Result<(Option<&'a Command>, bool)> {
+        let mut answers = false;
+        for command in commands {
+            if *command == Command::Close {
+                answers |= self.close_first()?;
+                continue;
+            }
+            let answer = self.ask(command)?;
+            answers |= answer.is_some();
+            if answer == Some(Answer::Refused) {
+                return Ok((Some(command), answers));
+            }
+        }
+        Ok((None, answers))
+    }
+
+    /// Closes an adapter, which may refuse where it is closed already, and lets go all that comes meanwhile.
+    fn close_first(&mut self) -> io::Result<bool> {
+        self.line.write(&Command::Close.encode())?;
+        let (clock, mut answers) = (Clock::start(), false);
+        while clock.now() < SETTLE_TIME {
+            while let Some(answer) = self.next_answer()? {
+                answers |= matches!(answer, Answer::Done | Answer::Refused);
+            }
+            self.line.wait(SETTLE_TIME.saturating_sub(clock.now()))?;
+        }
+        Ok(answers)
+    }
+
     /// Sends a command and waits for done or refused; frames of an adapter that was left open are let go.
     fn ask(&mut self, command: &Command) -> io::Result<Option<Answer>> {
         self.line.write(&command.encode())?;

@@ -186,7 +186,7 @@ impl App {
         }
         self.link.close(&self.waker);
         self.link.forget();
-        self.robot.forget();
+        self.robot.leave_source();
         self.tune.reset_view();
         if self.source == Source::Simulated {
             self.paused_before = self.live.status.paused;

@@ -85,6 +85,12 @@ impl RobotTab {
         self.events.clear();
     }
 
+    /// Another source is chosen: listening only, until somebody says otherwise of that one.
+    pub(crate) fn leave_source(&mut self) {
+        self.forget();
+        self.form.may_drive = false;
+    }
+
     /// Another session begins.
     pub(crate) fn begin(&mut self, options: &SessionOptions) {
         self.forget();

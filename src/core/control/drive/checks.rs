@@ -11,6 +11,8 @@ use crate::robot::Motor;
 
 /// A motor or an IMU answers if it was heard within this time, s; motors are asked for their health at 5 Hz.
 const FRESH_S: f64 = 0.5;
+/// Time in which everybody is heard for the first time.
+const FIRST_ANSWERS: Duration = Duration::from_millis(300);
 /// Share of the IMU's rate that has to be there.
 const RATE_SHARE: f64 = 0.9;
 /// Largest pitch, rad, and pitch rate, rad/s, at which a robot is let go.
@@ -32,12 +34,15 @@ pub(super) struct Checks {
     /// Mean of tilt less pitch, rad.
     tilt_apart_rad: Option<f64>,
     last_imu: Option<Duration>,
+    /// When checking began.
+    began: Duration,
 }
 
 impl Checks {
-    pub(super) fn new(balancing: bool) -> Self {
+    pub(super) fn new(balancing: bool, began: Duration) -> Self {
         Self {
             balancing,
+            began,
             list: Vec::new(),
             rocking: Rocking::default(),
             slopes: [Slope::Unknown; 2],
@@ -83,7 +88,11 @@ impl Checks {
         let mut list = std::mem::take(&mut self.list);
         list.clear();
         let ids = robot.link.motor_ids();
-        list.extend([Motor::Left, Motor::Right].map(|motor| answers(now, watch, motor, ids)));
+        let asked = now > self.began + FIRST_ANSWERS;
+        list.extend([Motor::Left, Motor::Right].map(|motor| match answers(now, watch, motor, ids) {
+            Check { name, result: CheckResult::Failed, .. } if !asked => waiting(name, "is asked".to_owned()),
+            check => check,
+        }));
         list.push(nobody_else(now, watch));
         list.extend(of_health(watch, robot));
         list.push(self.imu_rate(now, watch, robot));
@@ -101,6 +110,7 @@ impl Checks {
         let set_hz = f64::from(robot.link.imu_rate_hz);
         let fresh = watch.imu.last.is_some_and(|last| is_fresh(now, last.time));
         match watch.imu.rate_hz() {
+            _ if !fresh && now < self.began + FIRST_ANSWERS => waiting(NAME, "listening".to_owned()),
             _ if !fresh => failed(
                 NAME,
                 "the IMU is silent: look at its cable, port and baud rate (115200 for 200 Hz)".to_owned(),

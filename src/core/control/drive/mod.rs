@@ -41,7 +41,7 @@ use checks::Checks;
 use estimate::Estimator;
 use program::Program;
 use switching::Switching;
-use torque_scale::TorqueScale;
+use torque_scale::{TorqueScale, Verdict};
 use watch::Watch;
 
 /// Time between two queries of the motors' health, and of their state where no torque is asked for.
@@ -100,7 +100,7 @@ impl Drive {
             stage: Stage::Listening,
             watch: Watch::new(),
             estimator: Estimator::new(robot),
-            checks: Checks::new(program.balances()),
+            checks: Checks::new(program.balances(), Duration::ZERO),
             torque_scale: TorqueScale::new(robot, program.balances(), torque_limit_nm),
             program,
             reference: Reference::default(),
@@ -173,7 +173,7 @@ impl Drive {
     }
 
     fn begin_checks(&mut self, now: Duration, output: &mut Output) {
-        self.checks = Checks::new(self.program.balances());
+        self.checks = Checks::new(self.program.balances(), now);
         (self.next_health, self.next_state, self.next_checks) = (now, now, now);
         self.reach(Stage::Checking, output);
     }
@@ -259,11 +259,18 @@ impl Drive {
             return self.stop(now, reason, output);
         }
         let acted_nm = self.estimator.acting_when_read(now);
-        if let Some(found) = self.torque_scale.step(time_s, &readings, acted_nm)
-            && self.settings.torque_scale_check
-            && torque_scale::is_wrong(found)
-        {
-            return self.stop(now, StopReason::TorqueScale { factor: found.0 }, output);
+        if self.settings.torque_scale_check {
+            match self.torque_scale.step(time_s, &readings, acted_nm) {
+                Some(Verdict::Wrong { factor }) => {
+                    return self.stop(now, StopReason::TorqueScale { factor }, output);
+                }
+                Some(Verdict::Unclear) => output.events.push(DriveEvent::Warning(
+                    "whether the motors do what they are asked for is not clear from the nudges: check \
+                     torque_constant_nm_a and current_steps_per_a in [link] yourself"
+                        .to_owned(),
+                )),
+                Some(Verdict::Right) | None => {}
+            }
         }
         let program_s = self.program_time_s(time_s);
         if self.program.is_done(program_s) {

@@ -29,8 +29,11 @@ const GREATEST_SHARE: f64 = 0.5;
 /// Factors that are let pass, and deviations that the estimate has to lie outside.
 const ALLOWED: RangeInclusive<f64> = 0.7..=1.45;
 const DEVIATIONS: f64 = 3.0;
-/// Standard deviation above which nothing is said.
+/// Standard deviation above which a nudge says nothing, as where ticks came late; nudges of a balancing robot at most,
+/// and the time between two, s.
 const LARGEST_DEVIATION: f64 = 0.1;
+const NUDGES: u32 = 3;
+const NEXT_S: f64 = 1.0;
 
 /// The nudge, and what came of it.
 #[derive(Clone, Debug)]
@@ -43,7 +46,22 @@ pub(super) struct TorqueScale {
     rows: Vec<(f64, f64, f64)>,
     speed: f64,
     way: f64,
-    done: bool,
+    last_s: f64,
+    nudges_left: u32,
+}
+
+/// What has come of the nudges.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Verdict {
+    /// The motors do what they are asked for, as far as payload and friction let see.
+    Right,
+    /// They surely do not.
+    Wrong {
+        /// Done over asked.
+        factor: f64,
+    },
+    /// None of the nudges could be read.
+    Unclear,
 }
 
 impl TorqueScale {
@@ -62,7 +80,8 @@ impl TorqueScale {
             rows: Vec::new(),
             speed: 0.0,
             way: 0.0,
-            done: false,
+            last_s: 0.0,
+            nudges_left: if balancing { NUDGES } else { 1 },
         }
     }
 
@@ -74,7 +93,9 @@ impl TorqueScale {
     /// What is added to both torques at a time since arming, N m.
     pub(super) fn nudge_nm(&self, time_s: f64) -> f64 {
         let since = time_s - self.start_s;
-        if (0.0..HALF_S).contains(&since) {
+        if self.nudges_left == 0 {
+            0.0
+        } else if (0.0..HALF_S).contains(&since) {
             self.nudge_nm
         } else if (HALF_S..2.0 * HALF_S).contains(&since) {
             -self.nudge_nm
@@ -83,25 +104,35 @@ impl TorqueScale {
         }
     }
 
-    /// Takes the readings of a tick and the torques that acted since the last; the factor and its standard deviation,
-    /// once.
-    pub(super) fn step(
-        &mut self,
-        time_s: f64,
-        readings: &Readings,
-        acted_nm: [f64; 2],
-    ) -> Option<(f64, f64)> {
+    /// Takes the readings of a tick and the torques that acted since the last; the verdict, once.
+    pub(super) fn step(&mut self, time_s: f64, readings: &Readings, acted_nm: [f64; 2]) -> Option<Verdict> {
         let since = time_s - self.start_s;
-        if self.done || since < 0.0 {
+        let passed_s = if self.rows.is_empty() { TICK_S } else { time_s - self.last_s };
+        self.last_s = time_s;
+        if self.nudges_left == 0 || since < 0.0 {
             return None;
         }
-        let change = self.response * (acted_nm[0] + acted_nm[1]) * TICK_S;
-        self.way += (self.speed + 0.5 * change) * TICK_S;
+        let change = self.response * (acted_nm[0] + acted_nm[1]) * passed_s;
+        self.way += (self.speed + 0.5 * change) * passed_s;
         self.speed += change;
         let angle = f64::midpoint(readings.motor_angle_rad[0], readings.motor_angle_rad[1]);
         self.rows.push((since, angle, self.way));
-        self.done = since > 2.0 * HALF_S;
-        if self.done { self.estimate() } else { None }
+        if since > 2.0 * HALF_S { self.judge() } else { None }
+    }
+
+    fn judge(&mut self) -> Option<Verdict> {
+        let found = self.estimate().filter(|(_, deviation)| *deviation < LARGEST_DEVIATION);
+        self.nudges_left -= 1;
+        let Some((factor, deviation)) = found else {
+            self.rows.clear();
+            (self.speed, self.way) = (0.0, 0.0);
+            self.start_s += NEXT_S;
+            return (self.nudges_left == 0).then_some(Verdict::Unclear);
+        };
+        self.nudges_left = 0;
+        let margin = DEVIATIONS * deviation;
+        let wrong = factor + margin < *ALLOWED.start() || factor - margin > *ALLOWED.end();
+        Some(if wrong { Verdict::Wrong { factor } } else { Verdict::Right })
     }
 
     /// Least squares over the nudge.
@@ -124,10 +155,4 @@ impl TorqueScale {
         let variance = rest / (self.rows.len() as f64 - 4.0).max(1.0) * inverse[(0, 0)];
         Some((solution[0] / way, variance.max(0.0).sqrt() / way))
     }
-}
-
-/// Whether a factor is surely beyond what payload and friction can do.
-pub(super) fn is_wrong((factor, deviation): (f64, f64)) -> bool {
-    let margin = DEVIATIONS * deviation;
-    deviation < LARGEST_DEVIATION && (factor + margin < *ALLOWED.start() || factor - margin > *ALLOWED.end())
 }

@@ -14,6 +14,7 @@ use crate::robot::{Motor, SafetyLimits, State, TICK_S};
 const LEAST_EQUAL_READINGS: u32 = 5;
 /// Time over which the IMU's rate is counted, and the most readings in it.
 const RATE_WINDOW: Duration = Duration::from_secs(1);
+const LEAST_RATE_SPAN_S: f64 = 0.8;
 const MOST_READINGS: usize = 2048;
 /// Longest time without a motor's voltage and errors, which are asked for every 0.2 s.
 const HEALTH_TIMEOUT: Duration = Duration::from_millis(700);
@@ -116,22 +117,24 @@ impl Watch {
         if inputs.late.as_secs_f64() > limits.late_s {
             return Some(StopReason::Late { late_s: inputs.late.as_secs_f64() });
         }
+        let times = [now, now.saturating_sub(inputs.late)];
         let motors = Motor::BOTH.into_iter();
         let of_motors =
-            motors.zip(&self.motors).find_map(|(motor, watch)| watch.problem(motor, now, limits, on_since));
-        of_motors.or_else(|| self.imu.silent(now, limits))
+            motors.zip(&self.motors).find_map(|(motor, watch)| watch.problem(motor, times, limits, on_since));
+        of_motors.or_else(|| self.imu.silent(times[1], limits))
     }
 }
 
 impl MotorWatch {
+    /// Nobody can have been heard while the control loop was late: silence counts up to `heard_by`, when it was to step.
     fn problem(
         &self,
         motor: Motor,
-        now: Duration,
+        [now, heard_by]: [Duration; 2],
         limits: &SafetyLimits,
         on_since: Duration,
     ) -> Option<StopReason> {
-        let silent_s = self.state.map_or(f64::INFINITY, |state| age_s(now, state.time));
+        let silent_s = self.state.map_or(f64::INFINITY, |state| age_s(heard_by, state.time));
         if silent_s > limits.motor_timeout_s {
             return Some(StopReason::MotorSilent { motor, silent_s });
         }
@@ -193,11 +196,11 @@ impl ImuWatch {
         }
     }
 
-    /// Readings a second, over the last second; none before there are two.
+    /// Readings a second, over the last second; none before most of one has passed.
     pub(super) fn rate_hz(&self) -> Option<f64> {
         let (first, last) = self.heard.front().zip(self.heard.back())?;
         let span_s = (*last - *first).as_secs_f64();
-        (span_s > 0.0).then(|| (self.heard.len() - 1) as f64 / span_s)
+        (span_s > LEAST_RATE_SPAN_S).then(|| (self.heard.len() - 1) as f64 / span_s)
     }
 
     fn silent(&self, now: Duration, limits: &SafetyLimits) -> Option<StopReason> {
