@@ -7,17 +7,15 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
+use flqr_core::control::ControllerKind;
 use flqr_core::control::drive::{CheckResult, DriveOrder, Excitation, Stage, StopReason};
-use flqr_core::control::{BalanceController, ControllerKind};
 use flqr_core::device::{Session, SessionMode, SessionOptions, SessionOrder, Source, Status};
-use flqr_core::lqr;
-use flqr_core::model_file::RobotModel;
 
-use super::input;
 use super::interrupt::Interrupt;
-use super::monitor::{Wire, seconds};
+use super::monitor::Wire;
 use super::output::{Failure, Output, complain};
 use super::robot_lines::Lines;
+use super::{controller, input};
 
 /// How long the checks may take to pass.
 const CHECKS_LAST: Duration = Duration::from_secs(30);
@@ -40,7 +38,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_enum, default_value = "balance")]
     run: RunName,
     /// How long the robot is driven, s [default: until stopped, friction-sweep 120, air-multisine 60]
-    #[arg(long, value_parser = seconds)]
+    #[arg(long, value_parser = input::seconds)]
     seconds: Option<f64>,
     /// Drive once the checks have passed
     #[arg(long)]
@@ -86,7 +84,11 @@ impl Arguments {
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let (_, robot) = input::load_robot(&arguments.model)?;
-    let controller = controller(arguments, &robot)
+    let kind = match arguments.controller {
+        ControllerName::Lqr => ControllerKind::Lqr,
+        ControllerName::Flqr => ControllerKind::Flqr,
+    };
+    let controller = controller::design(&robot, Some(kind))
         .map_err(|problem| Failure::Message(format!("{}: {problem}", arguments.model.display())))?;
     let options = SessionOptions {
         source: arguments.source.clone(),
@@ -102,17 +104,6 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let mut session = Session::open(options, Arc::new(|| {})).map_err(Failure::from_error)?;
     session.send(SessionOrder::Drive(DriveOrder::Check));
     Dialogue { arguments, interrupt, lines: Lines::new(output), entered: entered_lines() }.hold(&mut session)
-}
-
-fn controller(arguments: &Arguments, robot: &RobotModel) -> Result<BalanceController, String> {
-    let weights = robot.weights.ok_or("it has no [lqr] table: add q_diagonal and r_diagonal")?;
-    let gain =
-        lqr::design(&robot.parameters.linear_model(), &weights).map_err(|error| error.to_string())?.gain;
-    let kind = match arguments.controller {
-        ControllerName::Lqr => ControllerKind::Lqr,
-        ControllerName::Flqr => ControllerKind::Flqr,
-    };
-    BalanceController::new(kind, robot, gain).map_err(|error| error.to_string())
 }
 
 /// Lines that the user enters, where somebody can.

@@ -1,5 +1,6 @@
 //! The command line: one file for each command, all over the same core functions as the window.
 
+mod controller;
 mod convert;
 mod drive;
 mod emulate;

@@ -31,7 +31,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "WHAT=[MESSAGE.]SIGNAL[*FACTOR]", requires = "dbc")]
     signal: Vec<Choice>,
     /// End after so many seconds [default: at Ctrl+C, or with the recording]
-    #[arg(long, value_parser = seconds)]
+    #[arg(long, value_parser = input::seconds)]
     seconds: Option<f64>,
     /// Speed of a replay; 0 is as fast as possible
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = speed)]
@@ -56,13 +56,6 @@ pub(super) struct Wire {
     /// Record the robot log to this file, and the raw frames to one of the same name that ends in .log
     #[arg(long, value_name = "OUT.csv")]
     pub(super) record: Option<PathBuf>,
-}
-
-pub(super) fn seconds(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(seconds) if (0.0..=1e6).contains(&seconds) => Ok(seconds),
-        _ => Err("it must be a number of seconds from 0 to 1000000".to_owned()),
-    }
 }
 
 fn speed(text: &str) -> Result<f64, String> {
