@@ -22,7 +22,7 @@ use super::progress::Progress;
 #[derive(Args)]
 pub(crate) struct Arguments {
     /// Length of each run, s; the control loop is checked for 6 s before it drives
-    #[arg(long, default_value_t = 20, value_parser = RangedU64ValueParser::<u64>::new().range(1..=3600))]
+    #[arg(long, default_value_t = 20, value_parser = RangedU64ValueParser::<u64>::new().range(10..=3600))]
     seconds: u64,
     /// Runs of each loop; they alternate
     #[arg(long, default_value_t = 5, value_parser = RangedU64ValueParser::<u64>::new().range(1..=1000))]
