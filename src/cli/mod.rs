@@ -13,6 +13,7 @@ mod interfaces;
 mod interrupt;
 mod monitor;
 mod output;
+mod printer;
 mod progress;
 mod reproduce;
 mod riccati;

@@ -12,7 +12,7 @@ use flqr_core::model_file::presets;
 use super::input;
 use super::interrupt::Interrupt;
 use super::output::{Failure, Output};
-use super::robot_lines::Lines;
+use super::robot_lines::{End, Lines, died};
 
 #[derive(Args)]
 pub(crate) struct Arguments {
@@ -86,13 +86,26 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let mut lines = Lines::new(output);
     let mut time = Duration::ZERO;
     let end = arguments.seconds.map_or(Duration::MAX, Duration::from_secs_f64);
-    while !interrupt.came() && time < end {
-        let Some(update) = session.wait(Duration::from_millis(100)) else { continue };
+    let reason = loop {
+        if interrupt.came() {
+            break End::Interrupt;
+        }
+        if time >= end {
+            break End::Time;
+        }
+        // Asked before, so that the last updates of a thread that has ended are read.
+        let is_over = session.has_died();
+        let Some(update) = session.wait(Duration::from_millis(100)) else {
+            if is_over {
+                return Err(died());
+            }
+            continue;
+        };
         time = update.status.time;
         lines.update(&update)?;
         if update.status.connection == Connection::Ended {
-            break;
+            break End::Recording;
         }
-    }
-    lines.end(time, None)
+    };
+    lines.end(time, &reason)
 }
