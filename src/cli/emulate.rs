@@ -6,7 +6,7 @@ use std::str::FromStr;
 use clap::Args;
 use flqr_core::link::lk::ReplyId;
 use flqr_core::link::{EmulatorSettings, TimedFault};
-use flqr_core::model_file::{RobotModel, presets};
+use flqr_core::model_file::presets;
 use flqr_core::robot::LinkSettings;
 use serde_json::Value;
 
@@ -131,6 +131,7 @@ mod serve {
     use std::io::{self, Read, Write};
     use std::os::fd::AsFd;
     use std::os::unix::fs::FileTypeExt;
+    use std::path::Path;
     use std::sync::Arc;
     use std::sync::atomic::{AtomicBool, Ordering};
     use std::thread;
@@ -176,7 +177,7 @@ mod serve {
             robot: name,
             seed: arguments.seed,
         };
-        output.result(&opened, |out| print(out, &opened))?;
+        output.result(&opened, |out| print(out, &opened, arguments))?;
         let input_ended = watch_input();
         let counts = server.run(&mut emulator, &mut |now| {
             arguments.seconds.is_some_and(|seconds| now.as_secs_f64() >= seconds)
@@ -189,7 +190,7 @@ mod serve {
         Ok(())
     }
 
-    fn print(out: &mut dyn Write, opened: &Opened) -> io::Result<()> {
+    fn print(out: &mut dyn Write, opened: &Opened, arguments: &Arguments) -> io::Result<()> {
         writeln!(out, "{}, seed {}", opened.robot, opened.seed)?;
         for (what, port) in [("CAN", opened.can), ("SLCAN", opened.slcan), ("IMU", opened.imu)] {
             port.map_or(Ok(()), |port| writeln!(out, "  {what:6}{port}"))?;
@@ -197,7 +198,15 @@ mod serve {
         let motors = opened.can.map(|name| format!("can:{name}"));
         let motors = motors.or(opened.slcan.map(|port| format!("slcan:{port}")));
         let imu = opened.imu.map_or(String::new(), |port| format!(" --imu serial:{port}@115200"));
-        motors.map_or(Ok(()), |motors| writeln!(out, "\nin another terminal: flqr monitor {motors}{imu}"))
+        let Some(motors) = motors else { return Ok(()) };
+        // Motors answer only when they are asked, which a monitor does not do.
+        let command = if arguments.balancing {
+            format!("monitor {motors}")
+        } else {
+            let model = arguments.model.as_deref().unwrap_or(Path::new("presets/paper.toml"));
+            format!("drive {motors} {}", model.display())
+        };
+        writeln!(out, "\nin another terminal: flqr {command}{imu}")
     }
 
     /// Tells when whoever holds the other end of standard input has closed it. Only a pipe is watched: a terminal
