@@ -8,6 +8,7 @@ mod export;
 mod file;
 mod fit;
 mod gains;
+mod imu;
 mod input;
 mod interfaces;
 mod interrupt;
@@ -67,6 +68,8 @@ enum Command {
     Drive(drive::Arguments),
     /// CAN interfaces and serial ports, and the commands that make one
     Interfaces,
+    /// Set the IMU's rate and baud rate, for good
+    Imu(imu::Arguments),
     /// How late the control loop's ticks come, beside a bare timer loop on this machine
     Timing(timing::Arguments),
 }
@@ -91,6 +94,7 @@ pub(crate) fn run(cli: Cli) -> ExitCode {
         Some(Command::Monitor(arguments)) => monitor::run(&arguments, &output),
         Some(Command::Drive(arguments)) => drive::run(&arguments, &output),
         Some(Command::Interfaces) => interfaces::run(&output),
+        Some(Command::Imu(arguments)) => imu::run(&arguments, &output),
         Some(Command::Timing(arguments)) => timing::run(&arguments, &output),
     };
     match done {
