@@ -21,7 +21,7 @@ use super::progress::Progress;
 
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Length of each run, s; the control loop is checked for 6 s before it drives
+    /// Length of each run, s, with the checks before the robot is driven
     #[arg(long, default_value_t = 20, value_parser = RangedU64ValueParser::<u64>::new().range(10..=3600))]
     seconds: u64,
     /// Runs of each loop; they alternate

@@ -87,9 +87,7 @@ pub enum TimingError {
         open: String,
     },
     /// The robot was stopped before the run was over.
-    #[error(
-        "the robot was stopped before the run was over, because {reason}: try again on a quieter machine"
-    )]
+    #[error("the robot was stopped before the run was over: {reason}")]
     Stopped {
         /// Why.
         reason: StopReason,
