@@ -27,24 +27,38 @@ last monitor.jsonl | jq -e '.connection == "connected" and .motors.left.rate_hz 
     { last monitor.jsonl; fail "the monitor hears the emulated robot and sends nothing"; }
 grep -q ' 141#A1' dump.log || fail "candump sees torque commands"
 [ "$(grep -c ' vcan0 ' watched.log)" -gt 500 ] || fail "the recording has the raw frames"
-candump -L -n 1 -T 3000 vcan0,181:7FF,141:7FF > reply.log &
+kill $emulator
+wait $emulator || true
+
+step "cansend asks a motor, and it answers"
+# No controller is on the bus here that would ask as well. A motor may answer on the identifier that it is asked on.
+flqr emulate $model --can vcan0 --json --seconds 60 > emulate.json &
+emulator=$!
+sleep 1
+candump -L -n 2 -T 8000 vcan0,142:7FF > reply.log &
 dump=$!
-sleep 0.3
+sleep 1
 cansend vcan0 142#9A00000000000000
 wait $dump
-wait $emulator
+cat reply.log
+grep -q ' 142#9A00000000000000$' reply.log || fail "candump sees the query"
+grep ' 142#9A' reply.log | grep -qv '#9A00000000000000$' || fail "motor 2 answers with its state"
+kill $emulator
+wait $emulator || true
 
 step "driven over CAN"
 # Here a tick may take as long as it likes.
 { cat $model; grep -q '^\[safety\]' $model || echo '[safety]'; } | sed 's/^\[safety\]/&\nimu_timeout_s = 1.0\nimu_frozen_s = 1.0\nmotor_timeout_s = 1.0\nlate_s = 1.0/' > patient.toml
-flqr emulate $model --can vcan0 --imu --json --seconds 40 > emulate.json &
+flqr emulate $model --can vcan0 --imu --json --seconds 120 > emulate.json &
 emulator=$!
 sleep 1
 imu=$(head -n 1 emulate.json | jq -r .imu)
 flqr drive can:vcan0 patient.toml --imu "serial:$imu@115200" --arm --yes --seconds 2 --record driven.csv --json > drive.jsonl ||
-    echo "drive ended with $?"
+    { cat drive.jsonl; fail "drive ended with $?"; }
 grep '"type":"event"' drive.jsonl || true
 tail -n 1 drive.jsonl
+tail -n 1 drive.jsonl | jq -e '.type == "end" and .stopped_by == "asked"' >/dev/null ||
+    fail "the robot was driven until its time was over"
 grep -q '"stage":"driving"' drive.jsonl || fail "the robot was driven"
 grep -q ' 141#8000000000000000' driven.log || fail "the motors were switched off in the end"
 kill $emulator

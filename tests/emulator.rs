@@ -154,6 +154,35 @@ fn motors_and_imu_answer_and_clients_come_and_go() {
 }
 
 #[test]
+fn an_imu_is_set_up_once_that_is_agreed_to() {
+    let emulator = Emulator::start(&["--imu"]);
+    let imu = format!("serial:{}@115200", emulator.ports["imu"].as_str().unwrap());
+    let set_up = |more: &[&str]| {
+        let program = Command::new(env!("CARGO_BIN_EXE_flqr"))
+            .args(["imu", &imu, "--baud", "115200", "--json"])
+            .args(more)
+            .stdin(Stdio::null())
+            .output()
+            .unwrap();
+        let message = String::from_utf8(program.stderr).unwrap();
+        serde_json::from_slice::<Value>(&program.stdout).map_err(|_| message)
+    };
+    let refused = set_up(&["--rate", "50"]).unwrap_err();
+    assert!(
+        refused.contains("at 115200 baud") && refused.contains("written, for good: 50 readings"),
+        "{refused}"
+    );
+    assert!(refused.contains("give --yes"), "{refused}");
+    assert!(set_up(&["--rate", "60", "--yes"]).unwrap_err().contains("no rate of 60 Hz"));
+    let set = set_up(&["--rate", "50", "--yes"]).unwrap();
+    let rate_hz = |when: &str| set[when]["rate_hz"].as_f64().unwrap();
+    assert!((90.0..110.0).contains(&rate_hz("before")), "the refused one wrote nothing: {set}");
+    assert!((45.0..55.0).contains(&rate_hz("after")), "{set}");
+    assert_eq!(set["after"]["packets"], serde_json::json!(["acceleration", "rate", "angle"]));
+    emulator.end();
+}
+
+#[test]
 fn of_a_full_bus_no_frame_is_lost_on_the_way_to_the_client() {
     let emulator = Emulator::start(&["--slcan", "--flood", "8000"]);
     assert_eq!(emulator.ports["imu"], Value::Null);

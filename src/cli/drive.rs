@@ -7,20 +7,20 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
+use flqr_core::control::ControllerKind;
 use flqr_core::control::drive::{CheckResult, DriveOrder, Excitation, Stage, StopReason};
-use flqr_core::control::{BalanceController, ControllerKind};
-use flqr_core::device::{Session, SessionMode, SessionOptions, SessionOrder, Source, Status};
-use flqr_core::lqr;
-use flqr_core::model_file::RobotModel;
+use flqr_core::device::{DriveStatus, Session, SessionMode, SessionOptions, SessionOrder, Source, Status};
 
-use super::input;
 use super::interrupt::Interrupt;
-use super::monitor::{Wire, seconds};
+use super::monitor::Wire;
 use super::output::{Failure, Output, complain};
-use super::robot_lines::Lines;
+use super::robot_lines::{End, Lines, died};
+use super::{controller, input};
 
-/// How long the checks may take to pass.
+/// How long the checks may take to pass, and arming from then on.
 const CHECKS_LAST: Duration = Duration::from_secs(30);
+/// Time between two orders to arm, longer than the answer to one takes to be heard.
+const ARM_AGAIN: Duration = Duration::from_secs(1);
 
 /// Without --arm nothing is sent but queries: the checks are made and told. With --arm the robot is driven once they
 /// have passed, after a question on the terminal or with --yes. Ctrl+C, or Enter, stops it.
@@ -40,7 +40,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_enum, default_value = "balance")]
     run: RunName,
     /// How long the robot is driven, s [default: until stopped, friction-sweep 120, air-multisine 60]
-    #[arg(long, value_parser = seconds)]
+    #[arg(long, value_parser = input::seconds)]
     seconds: Option<f64>,
     /// Drive once the checks have passed
     #[arg(long)]
@@ -86,7 +86,11 @@ impl Arguments {
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let (_, robot) = input::load_robot(&arguments.model)?;
-    let controller = controller(arguments, &robot)
+    let kind = match arguments.controller {
+        ControllerName::Lqr => ControllerKind::Lqr,
+        ControllerName::Flqr => ControllerKind::Flqr,
+    };
+    let controller = controller::design(&robot, Some(kind))
         .map_err(|problem| Failure::Message(format!("{}: {problem}", arguments.model.display())))?;
     let options = SessionOptions {
         source: arguments.source.clone(),
@@ -101,18 +105,19 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let interrupt = Interrupt::watch()?;
     let mut session = Session::open(options, Arc::new(|| {})).map_err(Failure::from_error)?;
     session.send(SessionOrder::Drive(DriveOrder::Check));
-    Dialogue { arguments, interrupt, lines: Lines::new(output), entered: entered_lines() }.hold(&mut session)
-}
-
-fn controller(arguments: &Arguments, robot: &RobotModel) -> Result<BalanceController, String> {
-    let weights = robot.weights.ok_or("it has no [lqr] table: add q_diagonal and r_diagonal")?;
-    let gain =
-        lqr::design(&robot.parameters.linear_model(), &weights).map_err(|error| error.to_string())?.gain;
-    let kind = match arguments.controller {
-        ControllerName::Lqr => ControllerKind::Lqr,
-        ControllerName::Flqr => ControllerKind::Flqr,
+    let mut dialogue = Dialogue {
+        arguments,
+        interrupt: &interrupt,
+        lines: Lines::apart(output)?,
+        entered: entered_lines(),
+        arming: Arming::default(),
+        driven_since: None,
+        stopping: false,
     };
-    BalanceController::new(kind, robot, gain).map_err(|error| error.to_string())
+    let done = dialogue.hold(&mut session);
+    // The motors are off before anybody is waited for.
+    drop(session);
+    done.and(dialogue.lines.finish(&interrupt))
 }
 
 /// Lines that the user enters, where somebody can.
@@ -133,63 +138,83 @@ fn entered_lines() -> Option<Receiver<String>> {
     Some(lines)
 }
 
-/// The course of events, from the checks to the end.
+/// The course of events, from the checks to the end. This thread sends the stop: it prints nothing while the robot is
+/// driven, so that no reader of the output keeps it waiting.
 struct Dialogue<'a> {
     arguments: &'a Arguments,
-    interrupt: Interrupt,
+    interrupt: &'a Interrupt,
     lines: Lines<'a>,
     entered: Option<Receiver<String>>,
+    arming: Arming,
+    driven_since: Option<Duration>,
+    stopping: bool,
 }
 
 impl Dialogue<'_> {
-    fn hold(mut self, session: &mut Session) -> Result<(), Failure> {
-        let mut asked = false;
-        let mut armed_at = None;
-        let mut ready_at = None;
-        let mut stopping = false;
+    fn hold(&mut self, session: &mut Session) -> Result<(), Failure> {
+        let mut last: Option<Status> = None;
         loop {
-            let Some(update) = session.wait(Duration::from_millis(100)) else { continue };
-            self.lines.update(&update)?;
-            let status = &update.status;
-            let now = status.time;
-            let stage = status.drive.as_ref().map_or(Stage::Listening, |drive| drive.stage);
-            match stage {
-                Stage::Stopped(reason) => return self.ended(now, reason),
-                Stage::Driving => {
-                    let since = *armed_at.get_or_insert(now);
-                    let over = now.saturating_sub(since) >= self.arguments.end();
-                    if !stopping && (over || self.wants_to_stop()) {
-                        stopping = true;
-                        session.send(SessionOrder::Drive(DriveOrder::Stop));
-                    }
+            // Asked before, so that the last updates of a thread that has ended are read.
+            let is_over = session.has_died();
+            match session.wait(Duration::from_millis(100)) {
+                Some(update) => {
+                    self.lines.update(&update)?;
+                    last = Some(update.status);
                 }
-                Stage::Listening | Stage::Checking if self.interrupt.came() => {
-                    session.send(SessionOrder::Drive(DriveOrder::Release));
-                    return self.lines.end(now, None);
-                }
-                Stage::Checking if passed(status) => {
-                    ready_at.get_or_insert(now);
-                    if !self.arguments.arm {
-                        return self.lines.end(now, None);
-                    }
-                    if self.agreed(&mut asked)? {
-                        session.send(SessionOrder::Drive(DriveOrder::Arm));
-                    }
-                }
-                Stage::Listening | Stage::Checking => {
-                    if ready_at.is_none() && now > CHECKS_LAST {
-                        return Err(failed_checks(status));
-                    }
-                }
+                None if is_over => return Err(died()),
+                None => {}
+            }
+            if let Some(end) = self.go_on(last.as_ref(), session)? {
+                return self.ended(last.map_or(Duration::ZERO, |status| status.time), &end);
             }
         }
     }
 
-    fn ended(&self, now: Duration, reason: StopReason) -> Result<(), Failure> {
-        self.lines.end(now, Some(Stage::Stopped(reason)))?;
-        match reason {
-            StopReason::Asked | StopReason::Done => Ok(()),
-            reason => Err(Failure::Message(format!("the robot was stopped: {reason}"))),
+    /// What follows from how things stand, also where nothing new was told; why this is the end, if it is.
+    fn go_on(&mut self, status: Option<&Status>, session: &mut Session) -> Result<Option<End>, Failure> {
+        let drive = status.and_then(|status| status.drive.as_ref());
+        let now = status.map_or(Duration::ZERO, |status| status.time);
+        match drive.map_or(Stage::Listening, |drive| drive.stage) {
+            Stage::Stopped(reason) => return Ok(Some(End::Stopped(reason))),
+            Stage::Driving => {
+                let since = *self.driven_since.get_or_insert(now);
+                let over = now.saturating_sub(since) >= self.arguments.end();
+                if !self.stopping && (over || self.wants_to_stop()) {
+                    self.stopping = true;
+                    session.send(SessionOrder::Drive(DriveOrder::Stop));
+                }
+            }
+            // Should an order to arm be on its way, it is undone: dropping the session switches the motors off.
+            Stage::Listening | Stage::Checking if self.interrupt.came() => {
+                session.send(SessionOrder::Drive(DriveOrder::Release));
+                return Ok(Some(End::Interrupt));
+            }
+            // What is entered from here on stops the robot.
+            Stage::Listening | Stage::Checking if self.arming.is_on_its_way(now) => {}
+            Stage::Checking if drive.is_some_and(passed) => {
+                self.arming.ready_at.get_or_insert(now);
+                if !self.arguments.arm {
+                    return Ok(Some(End::Checked));
+                }
+                if self.agreed()? {
+                    self.arming.ordered_at = Some(now);
+                    session.send(SessionOrder::Drive(DriveOrder::Arm));
+                }
+            }
+            Stage::Listening | Stage::Checking => self.discard_early_answers(),
+        }
+        if self.driven_since.is_none() && self.arming.is_too_late(now) {
+            return Err(failed_checks(drive));
+        }
+        Ok(None)
+    }
+
+    fn ended(&mut self, now: Duration, end: &End) -> Result<(), Failure> {
+        self.lines.end(now, end)?;
+        match end {
+            End::Stopped(StopReason::Asked | StopReason::Done) => Ok(()),
+            End::Stopped(reason) => Err(Failure::Message(format!("the robot was stopped: {reason}"))),
+            _ => Ok(()),
         }
     }
 
@@ -198,33 +223,90 @@ impl Dialogue<'_> {
     }
 
     /// Whether the motors may get torque.
-    fn agreed(&self, asked: &mut bool) -> Result<bool, Failure> {
+    fn agreed(&mut self) -> Result<bool, Failure> {
         if self.arguments.yes {
-            return Ok(!std::mem::replace(asked, true));
+            return Ok(true);
         }
         let Some(lines) = &self.entered else {
             let problem =
                 "the checks have passed, but there is no terminal to ask on: give --yes beside --arm";
             return Err(Failure::Message(problem.to_owned()));
         };
-        if !std::mem::replace(asked, true) {
+        if !std::mem::replace(&mut self.arming.asked, true) {
+            // What was typed before the question does not answer it.
+            lines.try_iter().for_each(drop);
             complain(
                 "the checks have passed. Hold the robot, then type drive and Enter; Enter or Ctrl+C stops it",
             );
         }
         Ok(lines.try_recv().is_ok_and(|line| line.trim() == "drive"))
     }
+
+    /// A line that was typed while a check is open must not arm the robot as soon as it passes.
+    fn discard_early_answers(&self) {
+        let answers = self.entered.iter().filter(|_| self.arming.asked);
+        if answers.flat_map(Receiver::try_iter).count() > 0 {
+            complain("a check is open again: type drive once all have passed");
+        }
+    }
 }
 
-fn passed(status: &Status) -> bool {
-    status.drive.as_ref().is_some_and(|drive| {
-        !drive.checks.is_empty() && drive.checks.iter().all(|check| check.result == CheckResult::Passed)
-    })
+/// Where arming stands.
+#[derive(Default)]
+struct Arming {
+    /// When the checks passed for the first time.
+    ready_at: Option<Duration>,
+    /// Whether the user was asked.
+    asked: bool,
+    /// When it was ordered last.
+    ordered_at: Option<Duration>,
 }
 
-fn failed_checks(status: &Status) -> Failure {
-    let checks = status.drive.iter().flat_map(|drive| &drive.checks);
-    let open: Vec<&str> =
+impl Arming {
+    /// Whether the answer to an order may not have been heard yet. It is a refusal if a check has fallen open meanwhile.
+    fn is_on_its_way(&self, now: Duration) -> bool {
+        self.ordered_at.is_some_and(|at| now.saturating_sub(at) < ARM_AGAIN)
+    }
+
+    /// Whether the robot should be driven by now.
+    fn is_too_late(&self, now: Duration) -> bool {
+        !self.asked && now.saturating_sub(self.ready_at.unwrap_or_default()) > CHECKS_LAST
+    }
+}
+
+fn passed(drive: &DriveStatus) -> bool {
+    !drive.checks.is_empty() && drive.checks.iter().all(|check| check.result == CheckResult::Passed)
+}
+
+fn failed_checks(drive: Option<&DriveStatus>) -> Failure {
+    let checks = drive.iter().flat_map(|drive| &drive.checks);
+    let mut open: Vec<&str> =
         checks.filter(|check| check.result != CheckResult::Passed).map(|check| check.text.as_str()).collect();
+    if open.is_empty() {
+        open.push(
+            "the checks pass now and then, but each order to arm found one of them open: hold it still",
+        );
+    }
     Failure::Message(format!("the robot is not ready to be driven: {}", open.join("; ")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn arming_is_ordered_again_after_a_refusal_but_not_for_ever() {
+        let seconds = Duration::from_secs_f64;
+        let mut arming = Arming { ready_at: Some(seconds(5.0)), ..Arming::default() };
+        assert!(!arming.is_on_its_way(seconds(5.0)), "none was ordered");
+        arming.ordered_at = Some(seconds(5.0));
+        let on_its_way = [5.0, 5.03, 5.9, 6.0, 8.0].map(|now| arming.is_on_its_way(seconds(now)));
+        assert_eq!(on_its_way, [true, true, true, false, false]);
+        let too_late = [30.1, 35.0, 35.1].map(|now| arming.is_too_late(seconds(now)));
+        assert_eq!(too_late, [false, false, true]);
+        arming.asked = true;
+        assert!(!arming.is_too_late(seconds(1000.0)), "whoever is asked has time");
+        let never_ready = Arming::default();
+        assert!(never_ready.is_too_late(seconds(30.1)) && !never_ready.is_too_late(seconds(30.0)));
+    }
 }

@@ -4,16 +4,14 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::Args;
-use flqr_core::control::{BalanceController, ControllerKind};
 use flqr_core::link::lk::ReplyId;
 use flqr_core::link::{EmulatorSettings, TimedFault};
-use flqr_core::lqr;
-use flqr_core::model_file::{RobotModel, presets};
+use flqr_core::model_file::presets;
 use flqr_core::robot::LinkSettings;
 use serde_json::Value;
 
-use super::input;
 use super::output::{Failure, Output};
+use super::{controller, input};
 
 #[derive(Args)]
 pub(crate) struct Arguments {
@@ -45,7 +43,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "HZ", default_value_t = 0, value_parser = clap::value_parser!(u32).range(..=100_000))]
     flood: u32,
     /// Time to run, s [default: until it is ended, or its standard input, if that is a pipe]
-    #[arg(long, value_parser = seconds)]
+    #[arg(long, value_parser = input::seconds)]
     seconds: Option<f64>,
 }
 
@@ -88,13 +86,6 @@ fn reply_id(text: &str) -> Result<ReplyId, String> {
     }
 }
 
-fn seconds(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(seconds) if (0.001..=1e6).contains(&seconds) => Ok(seconds),
-        _ => Err("it must be a number of seconds from 0.001 to 1000000".to_owned()),
-    }
-}
-
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let (name, robot) = match &arguments.model {
         Some(path) => input::load_robot(path)?,
@@ -104,28 +95,21 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
             (model.name, robot)
         }
     };
+    let on_board = arguments.balancing.then(|| {
+        controller::design(&robot, None).map_err(|problem| {
+            Failure::Message(format!("--balancing needs a controller of {name}: {problem}"))
+        })
+    });
     let settings = EmulatorSettings {
         seed: arguments.seed,
         wheels_in_air: arguments.wheels_in_air,
-        on_board: arguments.balancing.then(|| controller(&robot)).transpose()?,
+        on_board: on_board.transpose()?,
         actual: actual(&robot.link, &arguments.actual)?,
         reply_id: arguments.reply_id,
         flood_hz: arguments.flood,
         faults: arguments.fault.clone(),
     };
     serve::run(arguments, &name, &robot, settings, output)
-}
-
-/// The robot's own controller: FLQR where friction is known.
-fn controller(robot: &RobotModel) -> Result<BalanceController, Failure> {
-    let Some(weights) = &robot.weights else {
-        let missing = "--balancing needs a controller: give the model a table [lqr] with its weights";
-        return Err(Failure::Message(missing.to_owned()));
-    };
-    let design = lqr::design(&robot.parameters.linear_model(), weights).map_err(Failure::from_error)?;
-    let known = robot.friction.iter().any(Option::is_some);
-    let kind = if known { ControllerKind::Flqr } else { ControllerKind::Lqr };
-    BalanceController::new(kind, robot, design.gain).map_err(Failure::from_error)
 }
 
 /// The wiring with what differs from the model's; none if nothing does.
@@ -147,6 +131,7 @@ mod serve {
     use std::io::{self, Read, Write};
     use std::os::fd::AsFd;
     use std::os::unix::fs::FileTypeExt;
+    use std::path::Path;
     use std::sync::Arc;
     use std::sync::atomic::{AtomicBool, Ordering};
     use std::thread;
@@ -192,7 +177,7 @@ mod serve {
             robot: name,
             seed: arguments.seed,
         };
-        output.result(&opened, |out| print(out, &opened))?;
+        output.result(&opened, |out| print(out, &opened, arguments))?;
         let input_ended = watch_input();
         let counts = server.run(&mut emulator, &mut |now| {
             arguments.seconds.is_some_and(|seconds| now.as_secs_f64() >= seconds)
@@ -205,7 +190,7 @@ mod serve {
         Ok(())
     }
 
-    fn print(out: &mut dyn Write, opened: &Opened) -> io::Result<()> {
+    fn print(out: &mut dyn Write, opened: &Opened, arguments: &Arguments) -> io::Result<()> {
         writeln!(out, "{}, seed {}", opened.robot, opened.seed)?;
         for (what, port) in [("CAN", opened.can), ("SLCAN", opened.slcan), ("IMU", opened.imu)] {
             port.map_or(Ok(()), |port| writeln!(out, "  {what:6}{port}"))?;
@@ -213,7 +198,15 @@ mod serve {
         let motors = opened.can.map(|name| format!("can:{name}"));
         let motors = motors.or(opened.slcan.map(|port| format!("slcan:{port}")));
         let imu = opened.imu.map_or(String::new(), |port| format!(" --imu serial:{port}@115200"));
-        motors.map_or(Ok(()), |motors| writeln!(out, "\nin another terminal: flqr monitor {motors}{imu}"))
+        let Some(motors) = motors else { return Ok(()) };
+        // Motors answer only when they are asked, which a monitor does not do.
+        let command = if arguments.balancing {
+            format!("monitor {motors}")
+        } else {
+            let model = arguments.model.as_deref().unwrap_or(Path::new("presets/paper.toml"));
+            format!("drive {motors} {}", model.display())
+        };
+        writeln!(out, "\nin another terminal: flqr {command}{imu}")
     }
 
     /// Tells when whoever holds the other end of standard input has closed it. Only a pipe is watched: a terminal

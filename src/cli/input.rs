@@ -1,4 +1,4 @@
-//! Files that commands read.
+//! What commands are given: files and times.
 
 use std::fs::File;
 use std::io::{self, BufReader, Read};
@@ -50,6 +50,14 @@ pub(crate) fn load_robot(path: &Path) -> Result<(String, RobotModel), Failure> {
             "{}: this command needs a robot, but the file describes a single axis: give a model with a [robot] table",
             path.display()
         ))),
+    }
+}
+
+/// A time on the command line, s.
+pub(crate) fn seconds(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(seconds) if (0.001..=1e6).contains(&seconds) => Ok(seconds),
+        _ => Err("it must be a number of seconds from 0.001 to 1000000".to_owned()),
     }
 }
 

@@ -1,5 +1,6 @@
 //! The command line: one file for each command, all over the same core functions as the window.
 
+mod controller;
 mod convert;
 mod drive;
 mod emulate;
@@ -7,11 +8,13 @@ mod export;
 mod file;
 mod fit;
 mod gains;
+mod imu;
 mod input;
 mod interfaces;
 mod interrupt;
 mod monitor;
 mod output;
+mod printer;
 mod progress;
 mod reproduce;
 mod riccati;
@@ -65,6 +68,8 @@ enum Command {
     Drive(drive::Arguments),
     /// CAN interfaces and serial ports, and the commands that make one
     Interfaces,
+    /// Set the IMU's rate and baud rate, for good
+    Imu(imu::Arguments),
     /// How late the control loop's ticks come, beside a bare timer loop on this machine
     Timing(timing::Arguments),
 }
@@ -89,6 +94,7 @@ pub(crate) fn run(cli: Cli) -> ExitCode {
         Some(Command::Monitor(arguments)) => monitor::run(&arguments, &output),
         Some(Command::Drive(arguments)) => drive::run(&arguments, &output),
         Some(Command::Interfaces) => interfaces::run(&output),
+        Some(Command::Imu(arguments)) => imu::run(&arguments, &output),
         Some(Command::Timing(arguments)) => timing::run(&arguments, &output),
     };
     match done {

@@ -12,7 +12,7 @@ use flqr_core::model_file::presets;
 use super::input;
 use super::interrupt::Interrupt;
 use super::output::{Failure, Output};
-use super::robot_lines::Lines;
+use super::robot_lines::{End, Lines, died};
 
 #[derive(Args)]
 pub(crate) struct Arguments {
@@ -31,7 +31,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "WHAT=[MESSAGE.]SIGNAL[*FACTOR]", requires = "dbc")]
     signal: Vec<Choice>,
     /// End after so many seconds [default: at Ctrl+C, or with the recording]
-    #[arg(long, value_parser = seconds)]
+    #[arg(long, value_parser = input::seconds)]
     seconds: Option<f64>,
     /// Speed of a replay; 0 is as fast as possible
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = speed)]
@@ -56,13 +56,6 @@ pub(super) struct Wire {
     /// Record the robot log to this file, and the raw frames to one of the same name that ends in .log
     #[arg(long, value_name = "OUT.csv")]
     pub(super) record: Option<PathBuf>,
-}
-
-pub(super) fn seconds(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(seconds) if (0.0..=1e6).contains(&seconds) => Ok(seconds),
-        _ => Err("it must be a number of seconds from 0 to 1000000".to_owned()),
-    }
 }
 
 fn speed(text: &str) -> Result<f64, String> {
@@ -93,13 +86,26 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let mut lines = Lines::new(output);
     let mut time = Duration::ZERO;
     let end = arguments.seconds.map_or(Duration::MAX, Duration::from_secs_f64);
-    while !interrupt.came() && time < end {
-        let Some(update) = session.wait(Duration::from_millis(100)) else { continue };
+    let reason = loop {
+        if interrupt.came() {
+            break End::Interrupt;
+        }
+        if time >= end {
+            break End::Time;
+        }
+        // Asked before, so that the last updates of a thread that has ended are read.
+        let is_over = session.has_died();
+        let Some(update) = session.wait(Duration::from_millis(100)) else {
+            if is_over {
+                return Err(died());
+            }
+            continue;
+        };
         time = update.status.time;
         lines.update(&update)?;
         if update.status.connection == Connection::Ended {
-            break;
+            break End::Recording;
         }
-    }
-    lines.end(time, None)
+    };
+    lines.end(time, &reason)
 }

@@ -47,13 +47,22 @@ impl Output {
         text: impl FnOnce(&mut dyn Write) -> io::Result<()>,
     ) -> Result<(), Failure> {
         let mut out = io::BufWriter::new(io::stdout().lock());
-        if self.json {
-            serde_json::to_writer(&mut out, value).map_err(io::Error::from)?;
-            writeln!(out)?;
-        } else {
-            text(&mut out)?;
-        }
+        self.write(&mut out, value, text)?;
         Ok(out.flush()?)
+    }
+
+    /// Writes to `out` what [`Output::result`] prints.
+    pub(crate) fn write<T: Serialize>(
+        &self,
+        out: &mut dyn Write,
+        value: &T,
+        text: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+    ) -> io::Result<()> {
+        if !self.json {
+            return text(out);
+        }
+        serde_json::to_writer(&mut *out, value).map_err(io::Error::from)?;
+        writeln!(out)
     }
 }
 

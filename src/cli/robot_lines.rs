@@ -3,17 +3,26 @@
 use std::io::{self, Write};
 use std::time::Duration;
 
-use flqr_core::control::drive::{Check, CheckResult, Stage};
+use flqr_core::control::drive::{Check, CheckResult, StopReason};
 use flqr_core::device::{Connection, Counters, ImuStatus, MotorStatus, Status, Timing, Update};
 use flqr_core::record::Sample;
 use serde::Serialize;
 
+use super::interrupt::Interrupt;
 use super::output::{Failure, Output};
+use super::printer::Printer;
 
 /// Time between two lines of JSON.
 const JSON_INTERVAL: Duration = Duration::from_millis(100);
 /// Time between two lines of text.
 const TEXT_INTERVAL: Duration = Duration::from_secs(1);
+
+/// The error where a session's thread has ended by itself.
+pub(super) fn died() -> Failure {
+    let text = "the session's thread has ended by itself, which is a fault of this program: make sure that the motors \
+                are off, and report it";
+    Failure::Message(text.to_owned())
+}
 
 /// Prints updates.
 pub(super) struct Lines<'a> {
@@ -21,8 +30,34 @@ pub(super) struct Lines<'a> {
     next: Duration,
     newest: Option<Sample>,
     checks: Vec<Check>,
-    /// Whether a recording has come to its end.
-    ended: bool,
+    /// None where lines are printed at once, however long the reader takes.
+    printer: Option<Printer>,
+}
+
+/// Why there is nothing more to tell.
+pub(super) enum End {
+    /// The robot was stopped.
+    Stopped(StopReason),
+    /// A recording has come to its end.
+    Recording,
+    /// As long as was asked for.
+    Time,
+    /// Ctrl+C, or the system, before the robot was driven.
+    Interrupt,
+    /// The checks have passed, and more was not asked for.
+    Checked,
+}
+
+impl End {
+    fn text(&self) -> String {
+        match self {
+            Self::Stopped(reason) => reason.to_string(),
+            Self::Recording => "the recording is over".to_owned(),
+            Self::Time => "the time is over".to_owned(),
+            Self::Interrupt => "it was interrupted".to_owned(),
+            Self::Checked => "the checks have passed; --arm would drive the robot".to_owned(),
+        }
+    }
 }
 
 /// A line of JSON.
@@ -30,9 +65,23 @@ pub(super) struct Lines<'a> {
 #[serde(tag = "type", rename_all = "snake_case")]
 enum Line<'a> {
     Status(Box<StatusLine>),
-    Event { time_s: f64, kind: &'static str, text: &'a str },
-    Check { name: &'a str, result: &'static str, text: &'a str },
-    End { time_s: f64, stopped_by: Option<&'static str>, text: String },
+    Event {
+        time_s: f64,
+        kind: &'static str,
+        text: &'a str,
+    },
+    Check {
+        name: &'a str,
+        result: &'static str,
+        text: &'a str,
+    },
+    End {
+        time_s: f64,
+        stopped_by: Option<&'static str>,
+        text: String,
+        /// Status lines that nobody took in time.
+        lines_dropped: u64,
+    },
 }
 
 #[derive(Serialize)]
@@ -122,8 +171,14 @@ struct RecordingLine {
 }
 
 impl<'a> Lines<'a> {
+    /// Lines that are printed at once, however long their reader takes.
     pub(super) fn new(output: &'a Output) -> Self {
-        Self { output, next: Duration::ZERO, newest: None, checks: Vec::new(), ended: false }
+        Self { output, next: Duration::ZERO, newest: None, checks: Vec::new(), printer: None }
+    }
+
+    /// Lines that are never waited for. A slow reader loses status lines, which are counted, and nothing else.
+    pub(super) fn apart(output: &'a Output) -> Result<Self, Failure> {
+        Ok(Self { printer: Some(Printer::start(io::stdout())?), ..Self::new(output) })
     }
 
     /// Events and checks that have changed at once, the status when it is due.
@@ -131,7 +186,7 @@ impl<'a> Lines<'a> {
         for event in &update.events {
             let kind = event.kind.name();
             let line = Line::Event { time_s: event.time.as_secs_f64(), kind, text: &event.text };
-            self.output.result(&line, |out| {
+            self.print(&line, |out| {
                 writeln!(out, "{:9.3} s  {kind}: {}", event.time.as_secs_f64(), event.text)
             })?;
         }
@@ -140,8 +195,7 @@ impl<'a> Lines<'a> {
             self.checks(&drive.checks)?;
         }
         let now = update.status.time;
-        self.ended = update.status.connection == Connection::Ended;
-        if now >= self.next || self.ended {
+        if now >= self.next || update.status.connection == Connection::Ended {
             let interval = if self.output.is_json() { JSON_INTERVAL } else { TEXT_INTERVAL };
             // On a grid, so that a late line does not move all that follow.
             self.next = interval * (now.as_nanos() / interval.as_nanos() + 1) as u32;
@@ -151,14 +205,39 @@ impl<'a> Lines<'a> {
     }
 
     /// The last line.
-    pub(super) fn end(&self, time: Duration, stage: Option<Stage>) -> Result<(), Failure> {
-        let (stopped_by, text) = match stage {
-            Some(Stage::Stopped(reason)) => (Some(reason.name()), reason.to_string()),
-            _ if self.ended => (None, "the recording is over".to_owned()),
-            _ => (None, "the time is over".to_owned()),
-        };
-        let line = Line::End { time_s: time.as_secs_f64(), stopped_by, text: text.clone() };
-        self.output.result(&line, |out| writeln!(out, "{:9.3} s  end: {text}", time.as_secs_f64()))
+    pub(super) fn end(&mut self, time: Duration, end: &End) -> Result<(), Failure> {
+        let stopped_by = if let End::Stopped(reason) = end { Some(reason.name()) } else { None };
+        let (time_s, text) = (time.as_secs_f64(), end.text());
+        let lines_dropped = self.printer.as_ref().map_or(0, Printer::dropped);
+        let line = Line::End { time_s, stopped_by, text: text.clone(), lines_dropped };
+        self.print(&line, |out| {
+            if lines_dropped > 0 {
+                writeln!(
+                    out,
+                    "{time_s:9.3} s  {lines_dropped} lines were dropped, because nobody took them in time"
+                )?;
+            }
+            writeln!(out, "{time_s:9.3} s  end: {text}")
+        })
+    }
+
+    /// Waits until all is printed; after an interrupt only for a reader that still takes lines.
+    pub(super) fn finish(self, interrupt: &Interrupt) -> Result<(), Failure> {
+        self.printer.map_or(Ok(()), |printer| printer.finish(interrupt))
+    }
+
+    fn print(
+        &mut self,
+        line: &Line,
+        text: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+    ) -> Result<(), Failure> {
+        let Some(printer) = &mut self.printer else { return self.output.result(line, text) };
+        let mut bytes = Vec::new();
+        self.output.write(&mut bytes, line, text)?;
+        match line {
+            Line::Status(_) => printer.offer(bytes),
+            Line::Event { .. } | Line::Check { .. } | Line::End { .. } => printer.keep(bytes),
+        }
     }
 
     fn checks(&mut self, checks: &[Check]) -> Result<(), Failure> {
@@ -172,15 +251,16 @@ impl<'a> Lines<'a> {
                 CheckResult::Failed => "failed",
             };
             let line = Line::Check { name: check.name, result, text: &check.text };
-            self.output.result(&line, |out| writeln!(out, "  {result:8}{}: {}", check.name, check.text))?;
+            self.print(&line, |out| writeln!(out, "  {result:8}{}: {}", check.name, check.text))?;
         }
         self.checks = checks.to_vec();
         Ok(())
     }
 
-    fn status(&self, status: &Status) -> Result<(), Failure> {
-        let line = Line::Status(Box::new(StatusLine::new(status, self.newest.as_ref())));
-        self.output.result(&line, |out| text(out, status, self.newest.as_ref()))
+    fn status(&mut self, status: &Status) -> Result<(), Failure> {
+        let newest = self.newest;
+        let line = Line::Status(Box::new(StatusLine::new(status, newest.as_ref())));
+        self.print(&line, |out| text(out, status, newest.as_ref()))
     }
 }
 

@@ -6,23 +6,23 @@ use std::time::Duration;
 
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
+use flqr_core::control::ControllerKind;
 use flqr_core::control::drive::Excitation;
-use flqr_core::control::{BalanceController, ControllerKind};
 use flqr_core::device::{
     LatenessSummary, Priority, SessionMode, SessionOptions, Source, TimingComparison, TimingPlan,
     compare_timing,
 };
-use flqr_core::lqr::{self, Weights};
 use flqr_core::model_file::presets;
 use serde::Serialize;
 
+use super::controller;
 use super::output::{self, Failure, Output};
 use super::progress::Progress;
 
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Length of each run, s; the control loop is checked for 6 s before it drives
-    #[arg(long, default_value_t = 20, value_parser = RangedU64ValueParser::<u64>::new().range(1..=3600))]
+    /// Length of each run, s, with the checks before the robot is driven
+    #[arg(long, default_value_t = 20, value_parser = RangedU64ValueParser::<u64>::new().range(10..=3600))]
     seconds: u64,
     /// Runs of each loop; they alternate
     #[arg(long, default_value_t = 5, value_parser = RangedU64ValueParser::<u64>::new().range(1..=1000))]
@@ -62,10 +62,8 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
 fn options() -> Result<SessionOptions, Failure> {
     let model = presets::paper();
     let robot = model.robot().expect("the paper's preset is a robot").clone();
-    let weights: Weights = robot.weights.expect("a test finds weights in every preset");
-    let design = lqr::design(&robot.parameters.linear_model(), &weights).map_err(Failure::from_error)?;
-    let controller = BalanceController::new(ControllerKind::Flqr, &robot, design.gain);
-    let controller = Box::new(controller.map_err(Failure::from_error)?);
+    let controller =
+        Box::new(controller::design(&robot, Some(ControllerKind::Flqr)).map_err(Failure::Message)?);
     Ok(SessionOptions {
         source: Source::Emulated,
         imu: None,

@@ -44,4 +44,4 @@ pub use session::{
     RecordingStatus, SerialAddress, SerialAddressError, Session, SessionError, SessionMode, SessionOptions,
     SessionOrder, Source, SourceError, Status, Timing, Update, Waker,
 };
-pub use timing::{LatenessSummary, TimingComparison, TimingPlan, compare_timing};
+pub use timing::{LatenessSummary, TimingComparison, TimingError, TimingPlan, compare_timing};

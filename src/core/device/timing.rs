@@ -9,8 +9,8 @@ use serde::Serialize;
 
 use super::clock::Clock;
 use super::pacer::{Pacer, Priority, hurry};
-use super::session::{Session, SessionError, SessionOptions, SessionOrder, Timing};
-use crate::control::drive::{CheckResult, DriveOrder, Stage};
+use super::session::{Session, SessionError, SessionOptions, SessionOrder, Status, Timing, Update};
+use crate::control::drive::{CheckResult, DriveOrder, Stage, StopReason};
 
 /// How long, and how often.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,25 +69,72 @@ impl TimingComparison {
     }
 }
 
+/// Why nothing can be said of the control loop.
+#[derive(Debug, thiserror::Error)]
+pub enum TimingError {
+    /// The session could not be opened.
+    #[error(transparent)]
+    Session(#[from] SessionError),
+    /// The system gives no thread.
+    #[error("no thread for the bare timer loop: {0}")]
+    Thread(#[from] io::Error),
+    /// The checks took the whole run.
+    #[error("the robot was not driven within the run of {seconds} s{open}: give a longer run")]
+    NeverDriven {
+        /// Length of the run, s.
+        seconds: f64,
+        /// The checks that had not passed, each behind a semicolon.
+        open: String,
+    },
+    /// The robot was stopped before the run was over.
+    #[error("the robot was stopped before the run was over: {reason}")]
+    Stopped {
+        /// Why.
+        reason: StopReason,
+    },
+    /// The session's thread has ended.
+    #[error(
+        "the session's thread ended before the run was over, which is a fault of this program: report it"
+    )]
+    Died,
+}
+
+impl TimingError {
+    /// What kept a run of this length from ending with a driven robot; none where nothing did.
+    fn of(plan: TimingPlan, status: Option<&Status>) -> Option<Self> {
+        let drive = status.and_then(|status| status.drive.as_ref());
+        match drive.map(|drive| drive.stage) {
+            Some(Stage::Driving) => None,
+            Some(Stage::Stopped(reason)) => Some(Self::Stopped { reason }),
+            None | Some(Stage::Listening | Stage::Checking) => {
+                let checks = drive.iter().flat_map(|drive| &drive.checks);
+                let open = checks.filter(|check| check.result != CheckResult::Passed);
+                let open = open.map(|check| format!("; {}: {}", check.name, check.text)).collect();
+                Some(Self::NeverDriven { seconds: plan.run.as_secs_f64(), open })
+            }
+        }
+    }
+}
+
 /// Alternates runs of a bare timer loop and of a session's control loop; `watch` is told of the number of runs done, and
 /// may break off.
 ///
 /// # Errors
-/// The session's, and a system that gives no thread.
+/// [`TimingError`]; a robot that is not driven at the end of a run is one.
 pub fn compare_timing(
     plan: TimingPlan,
     options: &SessionOptions,
     watch: &mut dyn FnMut(usize) -> ControlFlow<()>,
-) -> Result<TimingComparison, SessionError> {
+) -> Result<TimingComparison, TimingError> {
     alternate(plan.runs, &mut || Ok(bare(plan)?), &mut || driven(plan, options.clone()), watch)
 }
 
 fn alternate(
     runs: usize,
-    bare: &mut dyn FnMut() -> Result<(Timing, Priority), SessionError>,
-    control: &mut dyn FnMut() -> Result<Timing, SessionError>,
+    bare: &mut dyn FnMut() -> Result<(Timing, Priority), TimingError>,
+    control: &mut dyn FnMut() -> Result<Timing, TimingError>,
     watch: &mut dyn FnMut(usize) -> ControlFlow<()>,
-) -> Result<TimingComparison, SessionError> {
+) -> Result<TimingComparison, TimingError> {
     let mut comparison =
         TimingComparison { bare: Vec::new(), control: Vec::new(), priority: Priority::RealTime };
     for done in 1..=runs {
@@ -121,21 +168,29 @@ fn bare(plan: TimingPlan) -> io::Result<(Timing, Priority)> {
 }
 
 /// A session as it is, which is checked, armed and driven, and what it says of its own loop.
-fn driven(plan: TimingPlan, options: SessionOptions) -> Result<Timing, SessionError> {
+fn driven(plan: TimingPlan, options: SessionOptions) -> Result<Timing, TimingError> {
     let clock = Clock::start();
     let mut session = Session::open(options, Arc::new(|| {}))?;
     session.send(SessionOrder::Drive(DriveOrder::Check));
-    let mut timing = Timing::default();
-    while clock.now() < plan.run && !session.has_died() {
-        let Some(update) = session.wait(Duration::from_millis(100)) else { continue };
-        timing = update.status.timing;
-        let Some(drive) = update.status.drive else { continue };
+    let mut last = None;
+    while clock.now() < plan.run {
+        if session.has_died() {
+            return Err(TimingError::Died);
+        }
+        let Some(Update { status, .. }) = session.wait(Duration::from_millis(100)) else { continue };
+        let Some(drive) = &last.insert(status).drive else { continue };
+        if let Stage::Stopped(_) = drive.stage {
+            break;
+        }
         let passed = drive.checks.iter().all(|check| check.result == CheckResult::Passed);
         if drive.stage == Stage::Checking && !drive.checks.is_empty() && passed {
             session.send(SessionOrder::Drive(DriveOrder::Arm));
         }
     }
-    Ok(timing)
+    match TimingError::of(plan, last.as_ref()) {
+        Some(error) => Err(error),
+        None => Ok(last.map(|status| status.timing).unwrap_or_default()),
+    }
 }
 
 /// The middle value; of an even number the mean of the two in the middle. Not a number of none.
@@ -152,6 +207,8 @@ fn median(values: impl Iterator<Item = f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::control::drive::Check;
+    use crate::device::{Connection, DriveStatus};
 
     fn timing(median_s: f64, p99_s: f64, greatest_s: f64) -> Timing {
         Timing { ticks: 10, median_s, p99_s, greatest_s, skipped: 1, histogram: Vec::new() }
@@ -188,6 +245,39 @@ mod tests {
         );
         assert_eq!(comparison.unwrap().p99_ratio(), 1.5);
         assert_eq!(order, ["bare", "control", "bare", "control"]);
+    }
+
+    #[test]
+    fn a_run_that_does_not_end_with_a_driven_robot_is_refused() {
+        let plan = TimingPlan { period: Duration::from_millis(1), run: Duration::from_secs(10), runs: 1 };
+        let refused = |stage| {
+            let check =
+                Check { name: "pose", result: CheckResult::Waiting, text: "hold it upright".to_owned() };
+            let drive = Some(DriveStatus { stage, checks: vec![check] });
+            TimingError::of(plan, Some(&Status { drive, ..status() })).map(|error| error.to_string())
+        };
+        assert_eq!(refused(Stage::Driving), None);
+        for (stage, said) in [
+            (Stage::Listening, "within the run of 10 s; pose: hold it upright"),
+            (Stage::Checking, "within the run of 10 s; pose: hold it upright"),
+            (Stage::Stopped(StopReason::NotFinite), &StopReason::NotFinite.to_string()),
+        ] {
+            assert!(refused(stage).is_some_and(|text| text.contains(said)), "{stage:?}");
+        }
+        assert!(TimingError::of(plan, None).is_some());
+    }
+
+    fn status() -> Status {
+        Status {
+            time: Duration::ZERO,
+            connection: Connection::Connected,
+            drive: None,
+            motors: Default::default(),
+            imu: Default::default(),
+            counters: Default::default(),
+            timing: Default::default(),
+            recording: None,
+        }
     }
 
     #[test]

@@ -1,7 +1,8 @@
 //! What the bytes of a frame say, for people.
 
+use flqr_core::link::ht8115::JointFrame;
 use flqr_core::link::lk::{self, Address, Command, MotorId, Reply, State1, State2};
-use flqr_core::link::{Direction, FrameKind, StampedFrame};
+use flqr_core::link::{Direction, Frame, FrameId, FrameKind, StampedFrame};
 use flqr_core::robot::LinkSettings;
 
 /// The meaning of a frame on the bus of a robot with these settings; none where it is not known.
@@ -12,7 +13,7 @@ pub(super) fn meaning(stamped: &StampedFrame, settings: &LinkSettings) -> Option
         FrameKind::Error => return Some("error frame".to_owned()),
         FrameKind::Data => {}
     }
-    let (address, bytes) = lk::address(frame)?;
+    let Some((address, bytes)) = lk::address(frame) else { return joint(frame) };
     let command =
         |motor| Some(format!("{} {}", name(motor, settings), command(&Command::decode(bytes)?, settings)));
     let reply = |motor| {
@@ -30,6 +31,36 @@ pub(super) fn meaning(stamped: &StampedFrame, settings: &LinkSettings) -> Option
         // Replies may come on the identifier of commands: what cannot be a command is one.
         Address::CommandOrReply(motor) => command(motor).or_else(|| reply(motor)),
     }
+}
+
+/// Identifiers of leg joints: commands carry the joint's number, and answers that of the computer, which is small too.
+/// Any frame of 6 or 8 bytes could be a joint's, so that others are left alone.
+const JOINT_IDS: std::ops::RangeInclusive<u16> = 0..=0x1F;
+
+/// A leg joint's frame; torque is a share of the greatest one, on which drivers of these joints disagree.
+fn joint(frame: &Frame) -> Option<String> {
+    let FrameId::Standard(id) = frame.id() else { return None };
+    let joint = JointFrame::decode(frame).filter(|_| JOINT_IDS.contains(&id))?;
+    let text = match joint {
+        JointFrame::Enter => "take commands".to_owned(),
+        JointFrame::Leave => "take no commands".to_owned(),
+        JointFrame::SetZero => "this is zero".to_owned(),
+        JointFrame::Command { .. } => {
+            let [stiffness, damping] = joint.gains()?;
+            let (stiffness, damping) = (number(stiffness, 1), number(damping, 2));
+            format!("to {}, stiffness {stiffness}, damping {damping}", joint_motion(&joint)?)
+        }
+        JointFrame::Feedback { joint: number, .. } => {
+            return Some(format!("joint {number} says {}", joint_motion(&joint)?));
+        }
+    };
+    Some(format!("joint {id} {text}"))
+}
+
+fn joint_motion(joint: &JointFrame) -> Option<String> {
+    let (angle_rad, speed_rad_s) = (number(joint.position_rad()?, 2), number(joint.speed_rad_s()?, 2));
+    let torque = number(100.0 * joint.torque(1.0)?, 0);
+    Some(format!("{angle_rad} rad, {speed_rad_s} rad/s, {torque} % of full torque"))
 }
 
 fn name(motor: MotorId, settings: &LinkSettings) -> String {
@@ -107,8 +138,6 @@ fn number(value: f64, decimals: usize) -> String {
 mod tests {
     use std::time::Duration;
 
-    use flqr_core::link::{Frame, FrameId};
-
     use super::*;
 
     fn check(id: u16, bytes: [u8; 8], direction: Direction, expected: Option<&str>) {
@@ -148,5 +177,27 @@ mod tests {
             check(id, bytes, direction, Some(expected));
         }
         check(0x7FF, [0; 8], Received, None);
+    }
+
+    /// Bytes as the fields of the MIT protocol; zero lies between two steps.
+    #[test]
+    fn frames_of_leg_joints_say_what_they_ask_for_and_tell() {
+        use Direction::{Received, Sent};
+        check(
+            3,
+            [0x80, 0, 0x80, 0x00, 0xA4, 0x33, 0x38, 0xE3],
+            Sent,
+            Some("joint 3 to 0.00 rad, 0.01 rad/s, 11 % of full torque, stiffness 20.0, damping 1.00"),
+        );
+        for (last, said) in [(0xFC, "take commands"), (0xFD, "take no commands"), (0xFE, "this is zero")] {
+            let mut bytes = [0xFF; 8];
+            bytes[7] = last;
+            check(1, bytes, Sent, Some(&format!("joint 1 {said}")));
+            check(0x300, bytes, Sent, None);
+        }
+        let frame = Frame::data(FrameId::Standard(0), &[2, 0xFF, 0xFF, 0x00, 0x08, 0x00]).unwrap();
+        let stamped = StampedFrame { time: Duration::ZERO, direction: Received, frame };
+        let said = "joint 2 says 95.50 rad, −45.00 rad/s, 0 % of full torque";
+        assert_eq!(meaning(&stamped, &LinkSettings::default()).as_deref(), Some(said));
     }
 }

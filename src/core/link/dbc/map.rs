@@ -127,15 +127,16 @@ impl SignalMap {
         Motor::BOTH.into_iter().find(|motor| !self.motors[*motor as usize].motion.has.contains(&true))
     }
 
-    /// What a frame tells; at most one reading of each motor and of the pitch.
+    /// What a frame tells; at most one reading of each motor and of the pitch. Values that are no finite number tell
+    /// nothing.
     pub fn receive(&mut self, stamped: &StampedFrame) -> impl Iterator<Item = Heard> + use<> {
         let StampedFrame { time, frame, .. } = *stamped;
         let mut pitch = [None; 2];
         let mut motors = [[None; 2]; 2];
         for source in self.sources.iter().filter(|source| source.id == frame.id()) {
-            let Some(value) = source.signal.value(&frame).map(|value| value * source.factor) else {
-                continue;
-            };
+            let value = source.signal.value(&frame).map(|value| value * source.factor);
+            // A float signal may be no number; added up, a single one would stay for good.
+            let Some(value) = value.filter(|value| value.is_finite()) else { continue };
             match source.quantity {
                 Quantity::Pitch => pitch[0] = Some(value),
                 Quantity::PitchRate => pitch[1] = Some(value),

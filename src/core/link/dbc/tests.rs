@@ -221,6 +221,26 @@ fn chosen_signals_become_readings() {
 }
 
 #[test]
+fn a_value_that_is_no_number_tells_nothing_and_does_not_stay() {
+    let mut map = SignalMap::new(&dbc(), &choices(&["motor_speed_right=Floats.Single*1"]), 1.0).unwrap();
+    let mut speed = |ms, value: f32| {
+        let [a, b, c, d] = value.to_le_bytes();
+        match hear(&mut map, ms, FrameId::Standard(258), &[a, b, c, d, 0, 0, 0, 0])[..] {
+            [] => None,
+            [Heard::Motor(MotorEvent::State(Motor::Right, state))] => {
+                Some((state.angle_rad, state.speed_rad_s))
+            }
+            ref other => panic!("{other:?}"),
+        }
+    };
+    assert_eq!(speed(1000, 2.0), Some((0.0, 2.0)));
+    for (ms, value) in [(1250, f32::NAN), (1500, f32::INFINITY), (1750, f32::NEG_INFINITY)] {
+        assert_eq!(speed(ms, value), None);
+    }
+    assert_eq!(speed(2000, 4.0), Some((3.0, 4.0)), "the mean of 2 and 4 rad/s for the second in between");
+}
+
+#[test]
 fn motors_of_which_nothing_moves_are_named() {
     let missing = |texts: &[&str]| SignalMap::new(&dbc(), &choices(texts), 1.0).unwrap().missing_motor();
     assert_eq!(missing(&["pitch=Imu.Pitch", "torque_left=LeftTorque"]), Some(Motor::Left));

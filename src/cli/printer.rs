@@ -1,0 +1,166 @@
+//! Lines for standard output from a thread of their own: whoever makes them never waits for whoever reads them.
+
+use std::io::{self, Write};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread::{Builder, JoinHandle, sleep};
+use std::time::{Duration, Instant};
+
+use super::interrupt::Interrupt;
+use super::output::Failure;
+
+/// Lines that may wait before those that can be spared are dropped.
+const MOST_WAITING: usize = 256;
+/// How long, after an interrupt, a reader that takes no line is waited for.
+const PATIENCE: Duration = Duration::from_secs(2);
+
+/// Prints lines in their order.
+pub(super) struct Printer {
+    /// None once all lines have been handed over.
+    lines: Option<Sender<Vec<u8>>>,
+    /// Lines that are not printed yet.
+    waiting: Arc<AtomicUsize>,
+    dropped: u64,
+    /// None once its failure has been told.
+    thread: Option<JoinHandle<io::Result<()>>>,
+}
+
+impl Printer {
+    /// Starts the thread.
+    pub(super) fn start(out: impl Write + Send + 'static) -> Result<Self, Failure> {
+        let (sender, lines) = channel();
+        let waiting = Arc::new(AtomicUsize::new(0));
+        let left = Arc::clone(&waiting);
+        let thread = Builder::new().name("output".to_owned()).spawn(move || print(out, &lines, &left))?;
+        Ok(Self { lines: Some(sender), waiting, dropped: 0, thread: Some(thread) })
+    }
+
+    /// Prints a line that must not be lost, sooner or later.
+    pub(super) fn keep(&mut self, line: Vec<u8>) -> Result<(), Failure> {
+        self.waiting.fetch_add(1, Ordering::Relaxed);
+        match self.lines.as_ref().map(|lines| lines.send(line)) {
+            Some(Ok(())) => Ok(()),
+            None | Some(Err(_)) => self.join(),
+        }
+    }
+
+    /// Prints a line that can be spared, unless too many wait already.
+    pub(super) fn offer(&mut self, line: Vec<u8>) -> Result<(), Failure> {
+        if self.waiting.load(Ordering::Relaxed) < MOST_WAITING {
+            return self.keep(line);
+        }
+        self.dropped += 1;
+        Ok(())
+    }
+
+    /// Lines that were spared.
+    pub(super) fn dropped(&self) -> u64 {
+        self.dropped
+    }
+
+    /// Waits until all is printed; after an interrupt only for a reader that still takes lines.
+    pub(super) fn finish(mut self, interrupt: &Interrupt) -> Result<(), Failure> {
+        self.lines = None;
+        let mut left = self.waiting.load(Ordering::Relaxed);
+        let mut since = Instant::now();
+        while self.thread.as_ref().is_some_and(|thread| !thread.is_finished()) {
+            sleep(Duration::from_millis(2));
+            let now_left = self.waiting.load(Ordering::Relaxed);
+            if now_left != left || !interrupt.came() {
+                (left, since) = (now_left, Instant::now());
+            } else if since.elapsed() > PATIENCE {
+                return Err(Failure::Message(format!(
+                    "{left} lines were not printed, because nobody takes them: read standard output"
+                )));
+            }
+        }
+        self.join()
+    }
+
+    /// What the thread, which ends by itself, came to.
+    fn join(&mut self) -> Result<(), Failure> {
+        let printed = self.thread.take().map_or(Ok(Ok(())), JoinHandle::join);
+        Ok(printed.unwrap_or_else(|_| Err(io::ErrorKind::Other.into()))?)
+    }
+}
+
+fn print(mut out: impl Write, lines: &Receiver<Vec<u8>>, waiting: &AtomicUsize) -> io::Result<()> {
+    for line in lines {
+        out.write_all(&line).and_then(|()| out.flush())?;
+        waiting.fetch_sub(1, Ordering::Relaxed);
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Mutex;
+
+    use super::*;
+
+    /// Takes no byte while it is locked.
+    #[derive(Clone, Default)]
+    struct Gate(Arc<Mutex<Vec<u8>>>);
+
+    impl Write for Gate {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            self.0.lock().map_err(|_| io::ErrorKind::Other)?.write(bytes)
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn behind_a_reader_that_stalls_lines_are_spared_but_none_that_is_to_be_kept() {
+        let gate = Gate::default();
+        let mut printer = Printer::start(gate.clone()).unwrap();
+        let stalled = gate.0.lock().unwrap();
+        for line in 0..1000 {
+            printer.offer(format!("status {line}\n").into_bytes()).unwrap();
+        }
+        printer.keep(b"event\n".to_vec()).unwrap();
+        printer.keep(b"end\n".to_vec()).unwrap();
+        assert_eq!(printer.dropped(), 1000 - MOST_WAITING as u64);
+        let told = Interrupt::default();
+        told.raise();
+        drop(stalled);
+        printer.finish(&told).unwrap();
+        let mut expected: String = (0..MOST_WAITING).map(|line| format!("status {line}\n")).collect();
+        expected += "event\nend\n";
+        assert_eq!(String::from_utf8(gate.0.lock().unwrap().clone()).unwrap(), expected);
+    }
+
+    #[test]
+    fn a_reader_that_takes_nothing_is_left_after_an_interrupt() {
+        let gate = Gate::default();
+        let mut printer = Printer::start(gate.clone()).unwrap();
+        let stalled = gate.0.lock().unwrap();
+        printer.keep(b"end\n".to_vec()).unwrap();
+        let told = Interrupt::default();
+        told.raise();
+        let Err(Failure::Message(message)) = printer.finish(&told) else { panic!("it was printed") };
+        assert!(message.starts_with("1 lines were not printed"), "{message}");
+        drop(stalled);
+    }
+
+    #[test]
+    fn a_reader_that_has_gone_is_told() {
+        struct Closed;
+        impl Write for Closed {
+            fn write(&mut self, _: &[u8]) -> io::Result<usize> {
+                Err(io::ErrorKind::BrokenPipe.into())
+            }
+
+            fn flush(&mut self) -> io::Result<()> {
+                Ok(())
+            }
+        }
+        let mut printer = Printer::start(Closed).unwrap();
+        let gone = |outcome| matches!(outcome, Err(Failure::ReaderGone));
+        let told = printer.keep(b"first\n".to_vec());
+        assert!(gone(told) || gone(printer.finish(&Interrupt::default())));
+    }
+}
