@@ -57,7 +57,7 @@ flqr drive can:vcan0 patient.toml --imu "serial:$imu@115200" --arm --yes --secon
     { cat drive.jsonl; fail "drive ended with $?"; }
 grep '"type":"event"' drive.jsonl || true
 tail -n 1 drive.jsonl
-tail -n 1 drive.jsonl | jq -e '.type == "end" and .stopped_by == "asked"' >/dev/null ||
+tail -n 1 drive.jsonl | jq -e '.type == "end" and .stopped_by == "time_over"' >/dev/null ||
     fail "the robot was driven until its time was over"
 grep -q '"stage":"driving"' drive.jsonl || fail "the robot was driven"
 grep -q ' 141#8000000000000000' driven.log || fail "the motors were switched off in the end"

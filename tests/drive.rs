@@ -78,6 +78,6 @@ fn a_reader_that_lives_gets_every_line_in_order_down_to_the_end() {
     let end = lines.last().unwrap();
     assert_eq!(
         (&end["type"], &end["stopped_by"], &end["lines_dropped"]),
-        (&"end".into(), &"asked".into(), &0.into())
+        (&"end".into(), &"time_over".into(), &0.into())
     );
 }

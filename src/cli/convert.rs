@@ -17,7 +17,8 @@ use super::{file, input};
 
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Files of one recording: robot log or bench logs (CSV), raw frames (candump); they are merged by time
+    /// Files of one recording: robot log or bench logs (CSV), raw frames (candump); they are merged by time. A single
+    /// robot log takes along the frames beside it
     #[arg(required = true, num_args = 2.., value_names = ["IN", "OUT.mcap"])]
     files: Vec<PathBuf>,
     /// A column of ours from one of the file's, as in torque_nm=current_a*0.32; repeatable
@@ -36,6 +37,7 @@ struct Converted<'a> {
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let (out, files) = arguments.files.split_last().expect("clap asks for two files at least");
     check_output(out)?;
+    let files = with_frames(files);
     let map = ColumnMap::new(arguments.map.clone()).map_err(Failure::from_error)?;
     let names: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
     let mut bytes = 0;
@@ -58,6 +60,17 @@ fn check_output(out: &Path) -> Result<(), Failure> {
         "{}: the last file is the one that is written, and only MCAP is: end its name in .mcap",
         out.display()
     )))
+}
+
+/// The raw frames belong to their recording: a robot log alone takes along those beside it.
+fn with_frames(files: &[PathBuf]) -> Vec<PathBuf> {
+    let mut all = files.to_vec();
+    if let [log] = files
+        && log.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("csv"))
+    {
+        all.extend(Some(log.with_extension("log")).filter(|frames| frames.is_file()));
+    }
+    all
 }
 
 /// Where columns go that are not those of a robot log.

@@ -19,6 +19,8 @@ use super::{controller, input};
 
 /// How long the checks may take to pass, and arming from then on.
 const CHECKS_LAST: Duration = Duration::from_secs(30);
+/// Longest time after a stop until both motors have said that they are off.
+const MOTORS_OFF_LAST: Duration = Duration::from_secs(2);
 /// Time between two orders to arm, longer than the answer to one takes to be heard.
 const ARM_AGAIN: Duration = Duration::from_secs(1);
 
@@ -112,6 +114,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         entered: entered_lines(),
         arming: Arming::default(),
         driven_since: None,
+        stopped_since: None,
         stopping: false,
     };
     let done = dialogue.hold(&mut session);
@@ -147,6 +150,7 @@ struct Dialogue<'a> {
     entered: Option<Receiver<String>>,
     arming: Arming,
     driven_since: Option<Duration>,
+    stopped_since: Option<Duration>,
     stopping: bool,
 }
 
@@ -175,13 +179,27 @@ impl Dialogue<'_> {
         let drive = status.and_then(|status| status.drive.as_ref());
         let now = status.map_or(Duration::ZERO, |status| status.time);
         match drive.map_or(Stage::Listening, |drive| drive.stage) {
-            Stage::Stopped(reason) => return Ok(Some(End::Stopped(reason))),
+            Stage::Stopped(reason) => {
+                let since = *self.stopped_since.get_or_insert(now);
+                let motors_off = drive.is_some_and(|drive| drive.motors_off);
+                if motors_off {
+                    return Ok(Some(End::Stopped(reason)));
+                }
+                if now.saturating_sub(since) > MOTORS_OFF_LAST {
+                    complain("the motors have not said that they are off: switch their supply off");
+                    return Ok(Some(End::Stopped(reason)));
+                }
+            }
             Stage::Driving => {
                 let since = *self.driven_since.get_or_insert(now);
                 let over = now.saturating_sub(since) >= self.arguments.end();
                 if !self.stopping && (over || self.wants_to_stop()) {
                     self.stopping = true;
-                    session.send(SessionOrder::Drive(DriveOrder::Stop));
+                    session.send(SessionOrder::Drive(if over {
+                        DriveOrder::Finish
+                    } else {
+                        DriveOrder::Stop
+                    }));
                 }
             }
             // Should an order to arm be on its way, it is undone: dropping the session switches the motors off.
@@ -212,7 +230,7 @@ impl Dialogue<'_> {
     fn ended(&mut self, now: Duration, end: &End) -> Result<(), Failure> {
         self.lines.end(now, end)?;
         match end {
-            End::Stopped(StopReason::Asked | StopReason::Done) => Ok(()),
+            End::Stopped(StopReason::Asked | StopReason::TimeOver | StopReason::Done) => Ok(()),
             End::Stopped(reason) => Err(Failure::Message(format!("the robot was stopped: {reason}"))),
             _ => Ok(()),
         }
@@ -280,11 +298,19 @@ fn passed(drive: &DriveStatus) -> bool {
 
 fn failed_checks(drive: Option<&DriveStatus>) -> Failure {
     let checks = drive.iter().flat_map(|drive| &drive.checks);
-    let mut open: Vec<&str> =
-        checks.filter(|check| check.result != CheckResult::Passed).map(|check| check.text.as_str()).collect();
+    let of = |result: CheckResult| -> Vec<String> {
+        let open = checks.clone().filter(|check| check.result == result);
+        open.map(|check| format!("{}: {}", check.name, check.text)).collect()
+    };
+    let mut open = of(CheckResult::Failed);
+    if open.is_empty() {
+        // What is waited for may wait for what has failed.
+        open = of(CheckResult::Waiting);
+    }
     if open.is_empty() {
         open.push(
-            "the checks pass now and then, but each order to arm found one of them open: hold it still",
+            "the checks pass now and then, but each order to arm found one of them open: hold it still"
+                .to_owned(),
         );
     }
     Failure::Message(format!("the robot is not ready to be driven: {}", open.join("; ")))

@@ -253,7 +253,7 @@ mod tests {
         let refused = |stage| {
             let check =
                 Check { name: "pose", result: CheckResult::Waiting, text: "hold it upright".to_owned() };
-            let drive = Some(DriveStatus { stage, checks: vec![check] });
+            let drive = Some(DriveStatus { stage, motors_off: false, checks: vec![check] });
             TimingError::of(plan, Some(&Status { drive, ..status() })).map(|error| error.to_string())
         };
         assert_eq!(refused(Stage::Driving), None);

@@ -158,8 +158,9 @@ impl Drive {
 
     fn obey(&mut self, now: Duration, order: &DriveOrder, output: &mut Output) {
         match (order, self.stage) {
-            (DriveOrder::Stop, Stage::Stopped(_)) => {}
+            (DriveOrder::Stop | DriveOrder::Finish, Stage::Stopped(_)) => {}
             (DriveOrder::Stop, _) => self.stop(now, StopReason::Asked, output),
+            (DriveOrder::Finish, _) => self.stop(now, StopReason::TimeOver, output),
             (DriveOrder::Check, Stage::Listening) => self.begin_checks(now, output),
             (DriveOrder::Arm, Stage::Checking) => self.arm(now, output),
             (DriveOrder::Release, Stage::Checking | Stage::Stopped(_)) => self.release(output),

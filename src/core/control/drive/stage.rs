@@ -39,6 +39,8 @@ pub enum DriveOrder {
     Arm,
     /// No torque, motors off, at once.
     Stop,
+    /// The same, because the time that was given is over.
+    Finish,
     /// After a stop, or in place of arming: back to listening.
     Release,
     /// Another controller from the next tick on, without a bump.
@@ -72,6 +74,9 @@ pub enum StopReason {
     /// Somebody asked for it.
     #[error("stop was asked for")]
     Asked,
+    /// The time that was given is over.
+    #[error("the time is over")]
+    TimeOver,
     /// The excitation has come to its end.
     #[error("the experiment is done")]
     Done,
@@ -204,6 +209,7 @@ impl StopReason {
     pub fn name(&self) -> &'static str {
         match self {
             Self::Asked => "asked",
+            Self::TimeOver => "time_over",
             Self::Done => "done",
             Self::ImuSilent { .. } => "imu_silent",
             Self::ImuFrozen { .. } => "imu_frozen",
