@@ -22,9 +22,20 @@ fn recording(name: &str) -> PathBuf {
     csv
 }
 
+/// The paper's robot on a machine that may be busy.
+fn patient_model(csv: &Path) -> PathBuf {
+    let model = csv.with_extension("toml");
+    let paper = fs::read_to_string("presets/paper.toml").unwrap();
+    let patience = "[safety]\nlate_s = 1.0\nmotor_timeout_s = 1.0\nimu_timeout_s = 1.0\nimu_frozen_s = 1.0\n";
+    fs::write(&model, format!("{paper}\n{patience}")).unwrap();
+    model
+}
+
 fn drive(csv: &Path, more: &[&str], out: Stdio) -> Child {
     Command::new(env!("CARGO_BIN_EXE_flqr"))
-        .args(["drive", "emulated", "presets/paper.toml", "--arm", "--yes", "--json", "--record"])
+        .args(["drive", "emulated"])
+        .arg(patient_model(csv))
+        .args(["--arm", "--yes", "--json", "--record"])
         .arg(csv)
         .args(more)
         .stdin(Stdio::null())
