@@ -5,7 +5,7 @@ use super::kind::{Declared, EffectKind, Feedforward, Parameter, Place, undeclare
 use super::law::{Action, Moment, Term};
 use super::machine::MachineKind;
 use crate::friction::{Stribeck, StribeckParameters};
-use crate::model_file::AxisModel;
+use crate::model_file::{AxisModel, AxisParameters};
 use crate::robot::Motor;
 
 const EVERYWHERE: &[MachineKind] = &[MachineKind::Robot, MachineKind::Rotary, MachineKind::Linear];
@@ -70,6 +70,101 @@ pub(super) static FRICTION_ASYMMETRY: EffectKind = EffectKind {
     },
     separated_by: "the same speed forward and backward, on level ground and on the same strip",
     feedforward: Feedforward::Causal,
+    declare: undeclared,
+};
+
+/// Friction at low speed that the declared curve lacks, or has too much of.
+pub(super) static LOW_SPEED_FRICTION: EffectKind = EffectKind {
+    id: "low_speed_friction",
+    summary: "level of dry friction at low speed that fades with exp(−|speed|/scale), of either sign",
+    place: Place::Motor,
+    machines: EVERYWHERE,
+    parameters: &[
+        Parameter::shape("speed_rad_s", [1e-3, 100.0], "speed over which it fades")
+            .linear("speed_m_s", [1e-5, 10.0]),
+        Parameter::amplitude("level_nm", [-5.0, 5.0], "level at rest").linear("level_n", [-1e4, 1e4]),
+    ],
+    series: false,
+    make_terms: |machine, shape| {
+        let scale = shape[0];
+        vec![Term::new(LOW_SPEED_FRICTION.parameters[1].key(machine.kind), move |m: &Moment| {
+            Action::friction(libm::exp(-m.motor_speed_rad_s.abs() / scale))
+        })]
+    },
+    separated_by: "constant speeds down to a tenth of a rad/s in both directions",
+    feedforward: Feedforward::Causal,
+    declare: undeclared,
+};
+
+/// Friction of loaded bearings and gears.
+pub(super) static LOAD_DEPENDENT_FRICTION: EffectKind = EffectKind {
+    id: "load_dependent_friction",
+    summary: "level of dry friction in proportion to the torque that is transmitted",
+    place: Place::Motor,
+    machines: EVERYWHERE,
+    parameters: &[Parameter::amplitude(
+        "coefficient",
+        [0.0, 1.0],
+        "level as a share of the torque's magnitude",
+    )],
+    series: false,
+    make_terms: |_, _| vec![Term::new("coefficient", |m: &Moment| Action::friction(m.torque_nm.abs()))],
+    separated_by: "several loads at one speed",
+    feedforward: Feedforward::Causal,
+    declare: undeclared,
+};
+
+/// Friction that fades as the grease warms up.
+pub(super) static THERMAL_FRICTION: EffectKind = EffectKind {
+    id: "thermal_friction",
+    summary: "level of dry friction that falls from the start on, to its end by 1 − exp(−time/time constant)",
+    place: Place::Motor,
+    machines: EVERYWHERE,
+    parameters: &[
+        Parameter::shape("time_constant_s", [1.0, 1e5], "time in which 63 % of it are gone"),
+        Parameter::amplitude("fall_nm", [-5.0, 5.0], "by how much the level falls in the end")
+            .linear("fall_n", [-1e4, 1e4]),
+    ],
+    series: false,
+    make_terms: |machine, shape| {
+        let time_constant_s = shape[0];
+        vec![Term::new(THERMAL_FRICTION.parameters[1].key(machine.kind), move |m: &Moment| {
+            Action::friction(libm::expm1(-m.time_s / time_constant_s))
+        })]
+    },
+    separated_by: "the same run cold and warm",
+    feedforward: Feedforward::Never("how warm the motor was at the start is not measured"),
+    declare: undeclared,
+};
+
+/// Dahl's bristles: friction that builds up over a way.
+pub(super) static PRESLIDING: EffectKind = EffectKind {
+    id: "presliding",
+    summary: "part of the dry friction that builds up over a way after each reversal, as bristles bend (Dahl)",
+    place: Place::Motor,
+    machines: EVERYWHERE,
+    parameters: &[
+        Parameter::shape("way_rad", [1e-6, 1.0], "way over which 63 % of it build up")
+            .linear("way_m", [1e-7, 0.1]),
+        Parameter::amplitude("level_nm", [0.0, 5.0], "level that builds up, part of the declared one")
+            .linear("level_n", [0.0, 1e4]),
+    ],
+    series: false,
+    make_terms: |machine, shape| {
+        let way = shape[0];
+        let (mut bend, mut before) = (0.0_f64, None);
+        vec![Term::new(PRESLIDING.parameters[1].key(machine.kind), move |m: &Moment| {
+            let moved = m.motor_angle_rad - before.unwrap_or(m.motor_angle_rad);
+            before = Some(m.motor_angle_rad);
+            if moved != 0.0 {
+                let end = moved.signum();
+                bend = end - (end - bend) * libm::exp(-moved.abs() / way);
+            }
+            Action { motor_nm: -bend, friction_nm: -1.0, ..Action::default() }
+        })]
+    },
+    separated_by: "slow triangles of several sizes about a standstill",
+    feedforward: Feedforward::Never("what has built up is remembered by the bristles and not measured"),
     declare: undeclared,
 };
 
@@ -155,7 +250,10 @@ fn correct_friction(
             }
             possible
         }
-        Declared::Axis(AxisModel::Rotary { friction, .. } | AxisModel::Linear { friction, .. }) => {
+        Declared::Axis(AxisModel {
+            parameters: AxisParameters::Rotary { friction, .. } | AxisParameters::Linear { friction, .. },
+            ..
+        }) => {
             let curve = new(*friction);
             *friction = curve.or(*friction);
             curve.is_some()

@@ -186,7 +186,7 @@ pub(super) fn undeclared(_: &Effect, _: Declared<'_>) -> bool {
 }
 
 impl EffectKind {
-    /// Whether each motor has its own.
+    /// Whether each motor of a robot has its own.
     pub fn per_motor(&self) -> bool {
         matches!(self.place, Place::Motor | Place::Actuator)
     }

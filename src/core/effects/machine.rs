@@ -1,6 +1,6 @@
 //! What effects act on.
 
-use crate::model_file::{AxisModel, RobotModel};
+use crate::model_file::{AxisModel, AxisParameters, RobotModel};
 use crate::robot::RobotParameters;
 
 /// Kind of a machine.
@@ -36,9 +36,9 @@ impl Machine {
 
     /// A motor or a carriage.
     pub fn axis(axis: &AxisModel) -> Self {
-        let (kind, moved) = match *axis {
-            AxisModel::Rotary { inertia_kg_m2, .. } => (MachineKind::Rotary, inertia_kg_m2),
-            AxisModel::Linear { mass_kg, .. } => (MachineKind::Linear, mass_kg),
+        let (kind, moved) = match axis.parameters {
+            AxisParameters::Rotary { inertia_kg_m2, .. } => (MachineKind::Rotary, inertia_kg_m2),
+            AxisParameters::Linear { mass_kg, .. } => (MachineKind::Linear, mass_kg),
         };
         Self { kind, parameters: RobotParameters { wheel_inertia_kg_m2: moved, ..NO_BODY } }
     }

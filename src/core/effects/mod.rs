@@ -7,12 +7,17 @@
 //! A static [`EffectKind`] in a file of this room and a line in [`KINDS`]: model files, simulator, estimator and tests
 //! take it from there.
 
+mod actuator;
+mod body;
 mod effect;
 mod friction;
 mod harmonics;
 mod kind;
 mod law;
 mod machine;
+mod parameters;
+mod sensors;
+mod surroundings;
 
 pub use effect::{Effect, EffectError, EffectLaw};
 pub use kind::{Declared, EffectKind, Feedforward, Parameter, Place, Role, unit_of};
@@ -20,7 +25,7 @@ pub use law::{Action, Law, Moment, Term};
 pub use machine::{Machine, MachineKind};
 
 /// Every effect of the library.
-pub static KINDS: [&EffectKind; 8] = [
+pub static KINDS: [&EffectKind; 35] = [
     &harmonics::COGGING,
     &harmonics::TORQUE_RIPPLE,
     &harmonics::POSITION_DEPENDENT_FRICTION,
@@ -29,6 +34,33 @@ pub static KINDS: [&EffectKind; 8] = [
     &friction::FRICTION_ASYMMETRY,
     &friction::COULOMB_ERROR,
     &friction::VISCOUS_ERROR,
+    &friction::LOW_SPEED_FRICTION,
+    &friction::LOAD_DEPENDENT_FRICTION,
+    &friction::PRESLIDING,
+    &friction::THERMAL_FRICTION,
+    &actuator::BACKLASH,
+    &actuator::COMMAND_DELAY,
+    &actuator::ACTUATOR_LAG,
+    &actuator::TORQUE_GAIN,
+    &actuator::TORQUE_SATURATION,
+    &actuator::TORQUE_DEADZONE,
+    &parameters::INERTIA_ERROR,
+    &parameters::MASS_ERROR,
+    &parameters::COM_HEIGHT_ERROR,
+    &parameters::BODY_INERTIA_ERROR,
+    &body::PITCH_OFFSET,
+    &body::STRUCTURAL_MODE,
+    &body::SLOSH,
+    &surroundings::GROUND_SLOPE,
+    &surroundings::TETHER_SPRING,
+    &surroundings::AERO_DRAG,
+    &surroundings::ROLLING_RESISTANCE,
+    &surroundings::WHEEL_ECCENTRICITY,
+    &surroundings::WHEEL_SLIP,
+    &surroundings::TERRAIN,
+    &surroundings::EXTERNAL_PUSH,
+    &sensors::GYRO_BIAS,
+    &sensors::IMU_DELAY,
 ];
 
 /// The effect with an id; none where the library has no such effect.

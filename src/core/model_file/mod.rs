@@ -5,11 +5,15 @@
 //! is silently dropped would leave a default in its place.
 
 mod axis_schema;
+mod effects_schema;
 pub mod presets;
 mod refusal;
 mod robot_schema;
 
+use std::borrow::Cow;
+
 use crate::ParameterError;
+use crate::effects::Effect;
 use crate::friction::{Compensation, Stribeck};
 use crate::lqr::Weights;
 use crate::robot::{
@@ -68,6 +72,8 @@ pub struct RobotModel {
     pub link: LinkSettings,
     /// When the driven robot is stopped.
     pub safety: SafetyLimits,
+    /// What else has been found; none of those that are errors of the numbers above, which are put right there.
+    pub effects: Vec<Effect>,
 }
 
 impl RobotModel {
@@ -87,6 +93,7 @@ impl RobotModel {
             surroundings: Surroundings::default(),
             link: LinkSettings::default(),
             safety: SafetyLimits::default(),
+            effects: Vec::new(),
         }
     }
 
@@ -130,8 +137,24 @@ impl RobotModel {
 }
 
 /// A single axis on a bench.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AxisModel {
+    /// What moves, and its friction.
+    pub parameters: AxisParameters,
+    /// What else has been found; none of those that are errors of the numbers above, which are put right there.
+    pub effects: Vec<Effect>,
+}
+
+impl AxisModel {
+    /// An axis without further effects.
+    pub fn new(parameters: AxisParameters) -> Self {
+        Self { parameters, effects: Vec::new() }
+    }
+}
+
+/// What moves on a bench.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum AxisModel {
+pub enum AxisParameters {
     /// A motor shaft.
     Rotary {
         /// Inertia about the shaft, kg m².
@@ -242,14 +265,18 @@ fn line_around(text: &str, byte: usize) -> String {
     text.lines().nth(line - 1).unwrap_or_default().trim().chars().take(60).collect()
 }
 
-/// First byte of the deepest key of `path` that the document has; 0 where it has none.
-fn start_of(document: &toml::de::DeTable<'_>, path: &[&str]) -> usize {
+/// First byte of the deepest key of `path` that the document has; 0 where it has none. The key of a list is followed by
+/// a number from 0.
+fn start_of(document: &toml::de::DeTable<'_>, path: &[Cow<'static, str>]) -> usize {
     let mut table = document;
     let mut start = 0;
-    for key in path {
-        let Some((name, value)) = table.get_key_value(*key) else { break };
+    let mut path = path.iter();
+    while let Some(key) = path.next() {
+        let Some((name, value)) = table.get_key_value(&**key) else { break };
         start = name.span().start;
-        let Some(inner) = value.get_ref().as_table() else { break };
+        let value = value.get_ref();
+        let member = value.as_array().and_then(|array| array.get(path.next()?.parse::<usize>().ok()?));
+        let Some(inner) = member.map_or(value, |member| member.get_ref()).as_table() else { break };
         table = inner;
     }
     start
@@ -377,9 +404,11 @@ ground = [{}, { points_m = [[0.5, 0.0], [0.8, 0.03]] }]
         assert_eq!(robot.friction[0].unwrap().parameters().static_nm, 0.0761);
         assert_eq!(robot.friction[1], None);
         assert_eq!(robot.weights.unwrap(), Weights::diagonal([60.0, 30.0, 100.0, 5.0], [20.0, 20.0]));
-        let Rig::Axis(AxisModel::Linear { mass_kg, friction }) = Model::from_toml(RAIL, "r").unwrap().rig
-        else {
-            panic!("a linear axis was read as something else");
+        let Rig::Axis(axis) = Model::from_toml(RAIL, "r").unwrap().rig else {
+            panic!("an axis was read as something else");
+        };
+        let AxisParameters::Linear { mass_kg, friction } = axis.parameters else {
+            panic!("a linear axis was read as a rotary one");
         };
         // Without the Stribeck keys the curve is plain Coulomb friction at every speed.
         assert_eq!((mass_kg, friction.unwrap().level_nm(0.01)), (95.0, 20.4));

@@ -11,7 +11,7 @@ use super::tracking::StepResponse;
 use crate::control::{Readings, SpeedPi, SpeedProgram, SpeedRun};
 use crate::friction::Stribeck;
 use crate::identify::Motor;
-use crate::model_file::{AxisModel, RobotModel};
+use crate::model_file::{AxisModel, AxisParameters, RobotModel};
 use crate::record::BenchSample;
 use crate::robot::{Actuation, MotorLimits, SensorSettings};
 
@@ -83,7 +83,9 @@ impl BenchRig {
 
     /// A rotary axis; none for a carriage.
     pub(super) fn of_axis(axis: &AxisModel) -> Option<Self> {
-        let AxisModel::Rotary { inertia_kg_m2, gravity_torque_nm, friction } = *axis else { return None };
+        let AxisParameters::Rotary { inertia_kg_m2, gravity_torque_nm, friction } = axis.parameters else {
+            return None;
+        };
         Some(Self {
             inertia_kg_m2,
             gravity_torque_nm,
