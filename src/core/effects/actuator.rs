@@ -92,7 +92,9 @@ pub(super) static TORQUE_DEADZONE: EffectKind = EffectKind {
         vec![Term::fixed(move |m: &Moment| Action::motor(-m.torque_nm.clamp(-width, width)))]
     },
     separated_by: "a slow triangle of torque about zero",
-    feedforward: Feedforward::Causal,
+    feedforward: Feedforward::Never(
+        "its inverse jumps where the torque passes zero, and the motors would chatter there",
+    ),
     declare: undeclared,
 };
 

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::kind::{EffectKind, Feedforward, Parameter, Place, undeclared};
+use super::kind::{EffectKind, Feedforward, NOT_INSIDE, Parameter, Place, undeclared};
 use super::law::{Action, Moment, Term};
 use super::machine::MachineKind;
 
@@ -22,7 +22,7 @@ pub(super) static PITCH_OFFSET: EffectKind = EffectKind {
         vec![Term::new("angle_rad", move |m: &Moment| Action::body(weight_nm * libm::cos(m.pitch_rad)))]
     },
     separated_by: "a second height of the legs, or the body on a plumb line",
-    feedforward: Feedforward::Causal,
+    feedforward: NOT_INSIDE,
     declare: undeclared,
 };
 
@@ -41,7 +41,7 @@ pub(super) static STRUCTURAL_MODE: EffectKind = EffectKind {
     make_terms: |machine, shape| {
         let mut mode = Oscillator::new(shape[0], shape[1]);
         let on_robot = machine.kind == MachineKind::Robot;
-        vec![Term::new("share", move |m: &Moment| {
+        vec![Term::remembering("share", move |m: &Moment| {
             // On a robot the motors' reaction drives the body.
             let torque = if on_robot { -m.torque_sum_nm } else { m.torque_nm };
             let late = mode.advance(torque, m.dt_s) - torque;
@@ -72,7 +72,7 @@ pub(super) static SLOSH: EffectKind = EffectKind {
         let mut mass = Oscillator::new(shape[0], shape[1]);
         let (stiffness, height_m, gravity) =
             (mass.omega * mass.omega, shape[2], machine.parameters.gravity_m_s2);
-        vec![Term::new("mass_kg", move |m: &Moment| {
+        vec![Term::remembering("mass_kg", move |m: &Moment| {
             // Driven by the acceleration of its place, against which it moves by s: s̈ = −a − 2ζω ṡ − ω² s.
             let driven = m.x_accel_m_s2 + height_m * m.pitch_accel_rad_s2;
             let place = mass.advance(-driven / stiffness, m.dt_s);

@@ -167,6 +167,13 @@ impl Law for EffectLaw {
         sum
     }
 
+    fn at(&self, moment: &Moment) -> Option<Action> {
+        let add = |sum: Action, (amplitude, law): &(f64, Box<dyn Law>)| {
+            Some(sum.plus(*amplitude, &law.at(moment)?))
+        };
+        self.terms.iter().try_fold(Action::default(), add)
+    }
+
     fn boxed_clone(&self) -> Box<dyn Law> {
         Box::new(self.clone())
     }

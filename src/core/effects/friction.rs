@@ -153,7 +153,7 @@ pub(super) static PRESLIDING: EffectKind = EffectKind {
     make_terms: |machine, shape| {
         let way = shape[0];
         let (mut bend, mut before) = (0.0_f64, None);
-        vec![Term::new(PRESLIDING.parameters[1].key(machine.kind), move |m: &Moment| {
+        vec![Term::remembering(PRESLIDING.parameters[1].key(machine.kind), move |m: &Moment| {
             let moved = m.motor_angle_rad - before.unwrap_or(m.motor_angle_rad);
             before = Some(m.motor_angle_rad);
             if moved != 0.0 {

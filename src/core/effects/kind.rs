@@ -180,6 +180,11 @@ pub enum Declared<'a> {
     Axis(&'a mut AxisModel),
 }
 
+/// Forces from outside and torques on the body.
+pub(super) const NOT_INSIDE: Feedforward = Feedforward::Never(
+    "a torque of the motors acts back on the body and cannot cancel it: the robot has to lean against it",
+);
+
 /// No number of a model can hold such an effect.
 pub(super) fn undeclared(_: &Effect, _: Declared<'_>) -> bool {
     false

@@ -106,17 +106,42 @@ impl Action {
 pub trait Law: Send + Sync {
     /// What it does at a moment.
     fn act(&mut self, moment: &Moment) -> Action;
+    /// The same of a law without memory; none of one that has some.
+    fn at(&self, _: &Moment) -> Option<Action> {
+        None
+    }
     /// The law with its memory.
     fn boxed_clone(&self) -> Box<dyn Law>;
 }
 
-/// A closure is a law; what it captures is its memory.
+/// A closure is a law with memory: what it captures.
 impl<F> Law for F
 where
     F: FnMut(&Moment) -> Action + Clone + Send + Sync + 'static,
 {
     fn act(&mut self, moment: &Moment) -> Action {
         self(moment)
+    }
+
+    fn boxed_clone(&self) -> Box<dyn Law> {
+        Box::new(self.clone())
+    }
+}
+
+/// A law without memory.
+#[derive(Clone, Copy)]
+struct Memoryless<F>(F);
+
+impl<F> Law for Memoryless<F>
+where
+    F: Fn(&Moment) -> Action + Clone + Send + Sync + 'static,
+{
+    fn act(&mut self, moment: &Moment) -> Action {
+        (self.0)(moment)
+    }
+
+    fn at(&self, moment: &Moment) -> Option<Action> {
+        Some((self.0)(moment))
     }
 
     fn boxed_clone(&self) -> Box<dyn Law> {
@@ -141,12 +166,20 @@ pub struct Term {
 }
 
 impl Term {
-    /// A law with an amplitude.
-    pub fn new(amplitude: impl Into<String>, law: impl Law + 'static) -> Self {
+    /// A law without memory, with an amplitude.
+    pub fn new<F>(amplitude: impl Into<String>, law: F) -> Self
+    where
+        F: Fn(&Moment) -> Action + Clone + Send + Sync + 'static,
+    {
+        Self { amplitude: Some(amplitude.into()), law: Box::new(Memoryless(law)) }
+    }
+
+    /// A law with memory and an amplitude.
+    pub fn remembering(amplitude: impl Into<String>, law: impl Law + 'static) -> Self {
         Self { amplitude: Some(amplitude.into()), law: Box::new(law) }
     }
 
-    /// A law without one.
+    /// A law without an amplitude.
     pub fn fixed(law: impl Law + 'static) -> Self {
         Self { amplitude: None, law: Box::new(law) }
     }

@@ -7,9 +7,11 @@
 //! A static [`EffectKind`] in a file of this room and a line in [`KINDS`]: model files, simulator, estimator and tests
 //! take it from there.
 
+mod acting;
 mod actuator;
 mod body;
 mod effect;
+mod feedforward;
 mod friction;
 mod harmonics;
 mod kind;
@@ -19,7 +21,9 @@ mod parameters;
 mod sensors;
 mod surroundings;
 
+pub use acting::RobotLaws;
 pub use effect::{Effect, EffectError, EffectLaw};
+pub use feedforward::EffectFeedforward;
 pub use kind::{Declared, EffectKind, Feedforward, Parameter, Place, Role, unit_of};
 pub use law::{Action, Law, Moment, Term};
 pub use machine::{Machine, MachineKind};

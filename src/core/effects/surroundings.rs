@@ -1,7 +1,7 @@
 //! Forces from outside the robot.
 
 use super::actuator::Lag;
-use super::kind::{EffectKind, Feedforward, Parameter, Place, undeclared};
+use super::kind::{EffectKind, Feedforward, NOT_INSIDE, Parameter, Place, undeclared};
 use super::law::{Action, Moment, Term};
 use super::machine::MachineKind;
 
@@ -31,7 +31,7 @@ pub(super) static TETHER_SPRING: EffectKind = EffectKind {
         ]
     },
     separated_by: "the same run elsewhere, and unplugged",
-    feedforward: Feedforward::Causal,
+    feedforward: NOT_INSIDE,
     declare: undeclared,
 };
 
@@ -48,7 +48,7 @@ pub(super) static GROUND_SLOPE: EffectKind = EffectKind {
         vec![Term::new("slope_rad", move |_: &Moment| Action::force(-weight_n, 0.0, 0.0))]
     },
     separated_by: "the same strip in both directions",
-    feedforward: Feedforward::Causal,
+    feedforward: NOT_INSIDE,
     declare: undeclared,
 };
 
@@ -71,7 +71,7 @@ pub(super) static AERO_DRAG: EffectKind = EffectKind {
         })]
     },
     separated_by: "speeds four times apart and more; wheels in the air have none",
-    feedforward: Feedforward::Causal,
+    feedforward: NOT_INSIDE,
     declare: undeclared,
 };
 
@@ -90,7 +90,7 @@ pub(super) static ROLLING_RESISTANCE: EffectKind = EffectKind {
         })]
     },
     separated_by: "wheels in the air have none; another payload",
-    feedforward: Feedforward::Causal,
+    feedforward: NOT_INSIDE,
     declare: undeclared,
 };
 
@@ -115,7 +115,7 @@ pub(super) static WHEEL_ECCENTRICITY: EffectKind = EffectKind {
         ]
     },
     separated_by: "wheels in the air have none, where cogging of order 1 stays",
-    feedforward: Feedforward::Causal,
+    feedforward: NOT_INSIDE,
     declare: undeclared,
 };
 
@@ -136,7 +136,7 @@ pub(super) static WHEEL_SLIP: EffectKind = EffectKind {
             (p.body_mass_kg + 2.0 * p.wheel_mass_kg, p.body_mass_kg * p.com_height_m);
         let mut force_n = Lag::new(shape[0]);
         // With x as the wheels' way, the robot's acceleration is ẍ less that of the slip.
-        vec![Term::new("slip_m_s_n", move |m: &Moment| {
+        vec![Term::remembering("slip_m_s_n", move |m: &Moment| {
             let [now, next] = force_n.advance(m.torque_sum_nm / p.wheel_radius_m, m.dt_s);
             let rate = if m.dt_s > 0.0 { (next - now) / m.dt_s } else { 0.0 };
             Action {

@@ -9,6 +9,7 @@ use super::simulation::{NotFinite, SENSOR_STREAM, SimulationSettings, TICK_S};
 use super::statistics::{Summary, between, summary};
 use super::tracking::StepResponse;
 use crate::control::{Readings, SpeedPi, SpeedProgram, SpeedRun};
+use crate::effects::{EffectLaw, Machine, RobotLaws};
 use crate::friction::Stribeck;
 use crate::identify::Motor;
 use crate::model_file::{AxisModel, AxisParameters, RobotModel};
@@ -58,6 +59,8 @@ pub(super) struct BenchRig {
     limits: MotorLimits,
     pub(super) actuation: Actuation,
     sensors: SensorSettings,
+    /// Effects in each motor.
+    laws: [Vec<EffectLaw>; 2],
     /// One shaft in place of two.
     single: bool,
 }
@@ -70,6 +73,8 @@ impl BenchRig {
 
     /// Both wheels of a robot.
     pub(super) fn of_robot(robot: &RobotModel) -> Self {
+        let robot = robot.with_effects_declared();
+        let laws = RobotLaws::new(&Machine::wheel_in_air(&robot), &robot.effects);
         Self {
             inertia_kg_m2: robot.parameters.wheel_inertia_kg_m2,
             gravity_torque_nm: 0.0,
@@ -77,15 +82,18 @@ impl BenchRig {
             limits: robot.limits,
             actuation: robot.actuation,
             sensors: robot.sensors,
+            laws: Motor::BOTH.map(|motor| laws.clone().into_motor(motor)),
             single: false,
         }
     }
 
     /// A rotary axis; none for a carriage.
     pub(super) fn of_axis(axis: &AxisModel) -> Option<Self> {
+        let axis = axis.with_effects_declared();
         let AxisParameters::Rotary { inertia_kg_m2, gravity_torque_nm, friction } = axis.parameters else {
             return None;
         };
+        let machine = Machine::axis(&axis);
         Some(Self {
             inertia_kg_m2,
             gravity_torque_nm,
@@ -93,6 +101,7 @@ impl BenchRig {
             limits: MotorLimits::default(),
             actuation: Actuation::default(),
             sensors: SensorSettings::default(),
+            laws: [0, 1].map(|_| axis.effects.iter().map(|effect| effect.law(&machine)).collect()),
             single: true,
         })
     }
@@ -145,6 +154,7 @@ impl<'a> Bench<'a> {
     fn new(rig: &'a BenchRig, control: SpeedRun, seed: u64) -> Self {
         let shaft = |motor: usize| {
             BenchPlant::new(rig.inertia_kg_m2, rig.gravity_torque_nm, rig.friction[motor], 0.0, 0.0)
+                .with_effects(rig.laws[motor].clone())
         };
         Self {
             rig,

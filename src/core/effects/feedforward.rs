@@ -1,0 +1,70 @@
+//! The torque that cancels the effects inside a motor.
+
+use super::effect::{Effect, EffectLaw};
+use super::kind::Feedforward;
+use super::law::{Action, Law, Moment};
+use super::machine::Machine;
+use crate::friction::Compensation;
+use crate::robot::Motor;
+
+/// Rounds in which a torque is found that cancels what depends on itself: each leaves the effect's share of the error
+/// of the one before.
+const ROUNDS: usize = 6;
+
+/// Feedforward of the effects inside both motors that can be known from what is measured now.
+#[derive(Clone, Debug)]
+pub struct EffectFeedforward {
+    effects: Vec<Effect>,
+    compensation: Compensation,
+    motors: [Vec<EffectLaw>; 2],
+}
+
+impl PartialEq for EffectFeedforward {
+    fn eq(&self, other: &Self) -> bool {
+        self.effects == other.effects && self.compensation == other.compensation
+    }
+}
+
+impl EffectFeedforward {
+    /// The feedforward of those effects that are causal; none where no effect is. Of dry friction the compensation's
+    /// share is fed forward, with its direction smoothed as that of the declared curve.
+    pub fn new(machine: &Machine, effects: &[Effect], compensation: Compensation) -> Option<Self> {
+        let causal =
+            |effect: &&Effect| effect.kind().feedforward == Feedforward::Causal && effect.kind().per_motor();
+        let effects: Vec<Effect> = effects.iter().filter(causal).cloned().collect();
+        let laws = |motor| {
+            let own = effects.iter().filter(|effect| effect.is_in(motor));
+            own.map(|effect| effect.law(machine)).collect()
+        };
+        let motors = Motor::BOTH.map(laws);
+        (!effects.is_empty()).then_some(Self { effects, compensation, motors })
+    }
+
+    /// The effects that are fed forward.
+    pub fn effects(&self) -> &[Effect] {
+        &self.effects
+    }
+
+    /// The torque to ask of a motor so that `torque_nm` comes out of it, N m. Of the moment angle and speed of the
+    /// motor are used.
+    pub fn asked_nm(&self, motor: Motor, moment: &Moment, torque_nm: f64) -> f64 {
+        let laws = &self.motors[motor as usize];
+        if laws.is_empty() {
+            return torque_nm;
+        }
+        let smoothed = libm::tanh(moment.motor_speed_rad_s / self.compensation.smoothing_speed_rad_s);
+        let direction = self.compensation.ratio * smoothed;
+        let mut asked = torque_nm;
+        for _ in 0..ROUNDS {
+            let moment = Moment { torque_nm: asked, ..*moment };
+            let act = |law: &EffectLaw| law.at(&moment).expect("a causal effect has no memory");
+            let sum = laws.iter().fold(Action::default(), |sum, law| sum.plus(1.0, &act(law)));
+            let next = torque_nm - sum.on_motor_nm(direction);
+            if next == asked {
+                break;
+            }
+            asked = next;
+        }
+        asked
+    }
+}
