@@ -45,6 +45,23 @@ impl EffectFeedforward {
         &self.effects
     }
 
+    /// The same without the effects that depend on the rotor's own angle; none where nothing is left.
+    pub fn without_rotor_angle(&self) -> Option<Self> {
+        let left = |effect: &Effect| !effect.kind().by_angle();
+        let [effects_left, all] = [self.effects.iter().filter(|e| left(e)).count(), self.effects.len()];
+        if effects_left == all {
+            return Some(self.clone());
+        }
+        let keep = |motor: Motor| {
+            let own = self.effects.iter().filter(|effect| effect.is_in(motor));
+            let kept = own.zip(&self.motors[motor as usize]).filter(|(effect, _)| left(effect));
+            kept.map(|(_, law)| law.clone()).collect()
+        };
+        let effects = self.effects.iter().filter(|effect| left(effect)).cloned().collect();
+        let motors = Motor::BOTH.map(keep);
+        (effects_left > 0).then_some(Self { effects, compensation: self.compensation, motors })
+    }
+
     /// The torque to ask of a motor so that `torque_nm` comes out of it, N m. Of the moment angle and speed of the
     /// motor are used.
     pub fn asked_nm(&self, motor: Motor, moment: &Moment, torque_nm: f64) -> f64 {

@@ -196,6 +196,11 @@ impl EffectKind {
         matches!(self.place, Place::Motor | Place::Actuator)
     }
 
+    /// Whether it depends on the rotor's own angle.
+    pub fn by_angle(&self) -> bool {
+        self.place == Place::Motor && self.series
+    }
+
     /// Whether it can be on a machine.
     pub fn is_on(&self, machine: MachineKind) -> bool {
         self.machines.contains(&machine)

@@ -210,7 +210,7 @@ fn role(options: &SessionOptions) -> Result<Role, DriveError> {
         SessionMode::Listen => Role::Listen(Box::new(Listener::new(&options.robot))),
         SessionMode::Drive { controller, excitation } => Role::Drive(Box::new(Drive::new(
             &options.robot,
-            **controller,
+            (**controller).clone(),
             *excitation,
             DriveSettings::default(),
         )?)),

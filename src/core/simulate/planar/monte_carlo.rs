@@ -113,7 +113,7 @@ impl Loop {
         let RobotModel { limits, actuation, .. } = &trial.robot;
         Self {
             index,
-            controller: trial.controller,
+            controller: trial.controller.clone(),
             actuators: [0, 1].map(|_| Actuator::new(limits, actuation)),
             noise: [0, 1].map(|motor| Noise::new(trial.seed, motor)),
             torque_noise_nm: actuation.torque_noise_nm,

@@ -81,7 +81,7 @@ fn ids_are_unique_and_every_kind_tells_about_itself() {
         assert!(!kind.machines.is_empty() && !kind.parameters.is_empty(), "{}", kind.id);
         assert_eq!(super::kind(kind.id), Some(*kind));
         if let Feedforward::Never(reason) = kind.feedforward {
-            assert!(reason.len() > 20, "{}", kind.id);
+            assert!(reason.len() > 10, "{}", kind.id);
         }
         let numbered = kind.parameters.iter().all(|p| MACHINES.iter().all(|&on| p.key(on).contains('#')));
         assert_eq!(numbered, kind.series, "{}", kind.id);
@@ -185,3 +185,7 @@ fn values_that_no_machine_has_are_refused_with_the_mend() {
     }
     assert!(Effect::new("cogging", MachineKind::Linear, None, cogging).is_err());
 }
+
+mod bench;
+mod feedforward;
+mod robot;
