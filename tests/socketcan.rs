@@ -1,6 +1,11 @@
 //! CAN interfaces for real. Where the kernel has no CAN the tests print `skipped`, unless `FLQR_REQUIRE_CAN` is set.
 //! They need `vcan0` and `vcan1`, up, and nobody else on them.
 #![cfg(target_os = "linux")]
+#![expect(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "a test that cannot go on fails, or says why it is skipped"
+)]
 
 use std::env;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};

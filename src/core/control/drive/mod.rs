@@ -105,7 +105,7 @@ impl Drive {
             watch: Watch::new(),
             estimator: Estimator::new(robot),
             checks: Checks::new(program.balances()),
-            torque_scale: TorqueScale::new(robot, program.balances()),
+            torque_scale: TorqueScale::new(robot, program.balances(), torque_limit_nm),
             program,
             loses_effects,
             reference: Reference::default(),
@@ -199,7 +199,7 @@ impl Drive {
         }
         self.estimator.count_from_here();
         self.program.start();
-        self.torque_scale = TorqueScale::new(&self.robot, self.program.balances());
+        self.torque_scale = TorqueScale::new(&self.robot, self.program.balances(), self.torque_limit_nm);
         self.reference = Reference::default();
         self.asked_nm = [0.0; 2];
         self.armed = now;
@@ -268,12 +268,14 @@ impl Drive {
             return self.stop(now, reason, output);
         }
         let acted_nm = self.estimator.acting_when_read(now);
-        if let Some(factor) = self.torque_scale.step(&readings, acted_nm)
+        if let Some(found) = self.torque_scale.step(time_s, &readings, acted_nm)
             && self.settings.torque_scale_check
+            && torque_scale::is_wrong(found)
         {
-            return self.stop(now, StopReason::TorqueScale { factor }, output);
+            return self.stop(now, StopReason::TorqueScale { factor: found.0 }, output);
         }
-        if self.program.is_done(time_s) {
+        let program_s = self.program_time_s(time_s);
+        if self.program.is_done(program_s) {
             return self.stop(now, StopReason::Done, output);
         }
         let balances = self.program.balances();
@@ -282,7 +284,11 @@ impl Drive {
         } else {
             held
         };
-        let wanted = self.program.step(time_s, &measurement, &self.reference);
+        let wanted = self.program.step(program_s, &measurement, &self.reference);
+        let nudge_nm =
+            if self.settings.torque_scale_check { self.torque_scale.nudge_nm(time_s) } else { 0.0 };
+        let limit_nm = self.torque_limit_nm;
+        let wanted = wanted.map(|nm| (nm + nudge_nm).clamp(-limit_nm, limit_nm));
         let asked: [f64; 2] = std::array::from_fn(|motor| self.slewed(motor, wanted[motor]));
         if !asked.iter().all(|torque| torque.is_finite()) {
             return self.stop(now, StopReason::NotFinite, output);
@@ -295,13 +301,22 @@ impl Drive {
             output.orders.push(MotorOrder::ReadHealth);
         }
         output.sample = Some(Sample::new(now.as_secs_f64(), &readings, &held.state, asked));
-        output.bench = self.program.target_rad_s(time_s).map(|target_speed_rad_s| BenchSample {
+        output.bench = self.program.target_rad_s(program_s).map(|target_speed_rad_s| BenchSample {
             time_s: now.as_secs_f64(),
             motor_angle_rad: readings.motor_angle_rad,
             motor_speed_rad_s: readings.motor_speed_rad_s,
             torque_nm: asked,
             target_speed_rad_s,
         });
+    }
+
+    /// Time of the program: wheels in the air are nudged before it begins.
+    fn program_time_s(&self, time_s: f64) -> f64 {
+        if self.program.balances() || !self.settings.torque_scale_check {
+            time_s
+        } else {
+            (time_s - self.torque_scale.end_s()).max(0.0)
+        }
     }
 
     fn problem(

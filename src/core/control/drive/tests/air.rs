@@ -64,7 +64,6 @@ fn a_multisine_records_bench_logs_from_which_the_inertia_is_fitted() {
         let report = fit(&[bench_log(&rig, motor)], Some(&model), motor, &options, watch).unwrap();
         let found = report.parameters["inertia_kg_m2"].value;
         let exact = robot.parameters.wheel_inertia_kg_m2;
-        println!("{motor}: inertia {found} for {exact}");
         assert!((found / exact - 1.0).abs() < 0.1, "{motor}: {found} for {exact}");
     }
 }
@@ -74,7 +73,6 @@ fn a_wrong_torque_scale_stops_the_sweep() {
     for scale in [1.986, 1.0 / 1.986, 2.53, 1.0 / 2.53] {
         let (rig, stop) = in_air(Excitation::SpeedSweep { seconds: 40.0 }, scale, 50.0);
         let Some(StopReason::TorqueScale { factor }) = stop else { panic!("{scale}: {stop:?}") };
-        println!("air {scale}: {factor} after {}", rig.tick - 4100);
         assert!((factor / scale - 1.0).abs() < 0.3 && rig.tick < 4100 + 8000, "{factor} for {scale}");
     }
 }
