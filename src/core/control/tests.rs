@@ -116,7 +116,7 @@ fn odometry_takes_the_way_from_the_mean_and_the_heading_from_the_difference() {
         found,
         Measurement {
             state,
-            motor_angle_rad: [0.0; 2],
+            motor_angle_rad: [1.0, 3.0],
             motor_speed_rad_s: [-4.0, 2.0],
             yaw_rad: 1.0,
             yaw_rate_rad_s: 3.0,

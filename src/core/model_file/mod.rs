@@ -485,10 +485,10 @@ sin_1_n = 0.5
                 lines + 2,
                 "no machine can have",
             ),
-            (format!("{RAIL}[[effects]]\nid = \"tether_spring\"\n"), 9, "cannot be on a linear axis"),
+            (format!("{RAIL}[[effects]]\nid = \"tether_spring\"\n"), 10, "cannot be on a linear axis"),
             (
                 format!("{RAIL}{}", RAIL_EFFECTS.replace("period_1_m", "order_1")),
-                11,
+                12,
                 "use period_1_m, cos_1_n",
             ),
         ] {

@@ -210,12 +210,12 @@ fn friction_that_depends_on_the_angle_takes_its_work_and_holds_where_it_is_high(
 fn bristles_are_a_spring_first_and_coulomb_friction_then() {
     let (level, way) = (0.02, 0.01);
     let effect = effect("presliding", &[("way_rad", way), ("level_nm", level)]);
-    // Slowly up to a tenth of the level, and back: z' = (1 − z)/way forward and (1 + z)/way backward, so that they bend
+    // Slowly and without a kink up to a tenth of the level, and back: z' = (1 − z)/way forward and (1 + z)/way backward, so that they bend
     // by −ln 0.9 of the way and come back by ln 1.1 of it.
     let mut shaft = shaft(&effect, Some(coulomb(level)), 0.0, 0.0);
     let mut bent = Vec::new();
     for tick in 0..8000 {
-        let share = f64::from(if tick < 4000 { tick } else { 8000 - tick }) / 4000.0;
+        let share = 0.5 - 0.5 * (std::f64::consts::TAU * f64::from(tick) / 8000.0).cos();
         shaft.advance(0.1 * level * share, 1e-3, 4);
         if (tick + 1) % 4000 == 0 {
             bent.push(shaft.angle_rad() / way);
