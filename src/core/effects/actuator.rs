@@ -50,7 +50,7 @@ pub(super) static TORQUE_GAIN: EffectKind = EffectKind {
     summary: "the torque is another than the one that is asked for by a constant share",
     place: Place::Actuator,
     machines: EVERYWHERE,
-    parameters: &[Parameter::amplitude("gain", [-1.0, 10.0], "share of the torque that is added to it")],
+    parameters: &[Parameter::amplitude("gain", [-0.9, 10.0], "share of the torque that is added to it")],
     series: false,
     make_terms: |_, _| vec![Term::new("gain", |m: &Moment| Action::motor(m.torque_nm))],
     separated_by: "a known payload, or a known weight on a lever",

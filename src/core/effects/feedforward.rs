@@ -7,9 +7,11 @@ use super::machine::Machine;
 use crate::friction::Compensation;
 use crate::robot::Motor;
 
-/// Rounds in which a torque is found that cancels what depends on itself: each leaves the effect's share of the error
-/// of the one before.
-const ROUNDS: usize = 6;
+/// Most secants in which a torque is found that cancels what depends on itself. For effects in proportion to the torque
+/// one is enough.
+const SECANTS: usize = 6;
+/// Error at which it is found, N m.
+const FOUND_NM: f64 = 1e-12;
 
 /// Feedforward of the effects inside both motors that can be known from what is measured now.
 #[derive(Clone, Debug)]
@@ -71,17 +73,23 @@ impl EffectFeedforward {
         }
         let smoothed = libm::tanh(moment.motor_speed_rad_s / self.compensation.smoothing_speed_rad_s);
         let direction = self.compensation.ratio * smoothed;
-        let mut asked = torque_nm;
-        for _ in 0..ROUNDS {
+        let excess = |asked: f64| {
             let moment = Moment { torque_nm: asked, ..*moment };
             let act = |law: &EffectLaw| law.at(&moment).expect("a causal effect has no memory");
             let sum = laws.iter().fold(Action::default(), |sum, law| sum.plus(1.0, &act(law)));
-            let next = torque_nm - sum.on_motor_nm(direction);
-            if next == asked {
+            asked + sum.on_motor_nm(direction) - torque_nm
+        };
+        let (mut before, mut excess_before) = (torque_nm, excess(torque_nm));
+        let mut asked = torque_nm - excess_before;
+        for _ in 0..SECANTS {
+            let excess_now = excess(asked);
+            // Not a number ends it too.
+            if !(excess_now.abs() > FOUND_NM && excess_now != excess_before) {
                 break;
             }
-            asked = next;
+            let next = asked - excess_now * (asked - before) / (excess_now - excess_before);
+            (before, excess_before, asked) = (asked, excess_now, next);
         }
-        asked
+        if asked.is_finite() { asked } else { torque_nm }
     }
 }

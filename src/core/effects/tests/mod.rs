@@ -1,7 +1,8 @@
 //! Every kind at once: what all of them must do.
 
 use super::*;
-use crate::robot::RobotParameters;
+use crate::model_file::{AxisModel, AxisParameters, Model, Rig, presets};
+use crate::robot::{Motor, RobotParameters};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -159,6 +160,36 @@ fn every_key_names_its_unit() {
             let [lowest, highest] = parameter.range(on);
             assert!(lowest < highest && lowest.is_finite() && highest.is_finite(), "{}: {key}", kind.id);
             assert!(parameter.meaning.len() > 5, "{}: {key}", kind.id);
+        }
+    }
+}
+
+#[test]
+fn every_kind_survives_the_round_trip_through_a_model_file() {
+    let rng = &mut ChaCha8Rng::seed_from_u64(6);
+    for (kind, on) in everywhere().filter(|(kind, _)| kind.feedforward != Feedforward::Declared) {
+        let (shape, sizes) = drawn(kind, on, 3, rng);
+        let on_one = kind.per_motor() && on == MachineKind::Robot;
+        for motor in [None, on_one.then_some(Motor::Left), on_one.then_some(Motor::Right)] {
+            let effect = Effect::estimated(kind, on, motor, &shape, &sizes).unwrap();
+            let mut model = presets::paper();
+            let axis = |parameters| AxisModel { effects: vec![effect.clone()], ..AxisModel::new(parameters) };
+            match (&mut model.rig, on) {
+                (Rig::Robot(robot), MachineKind::Robot) => robot.effects.push(effect.clone()),
+                (rig, MachineKind::Linear) => {
+                    *rig = Rig::Axis(axis(AxisParameters::Linear { mass_kg: 95.0, friction: None }));
+                }
+                (rig, _) => {
+                    let parameters = AxisParameters::Rotary {
+                        inertia_kg_m2: 0.01,
+                        gravity_torque_nm: 0.0,
+                        friction: None,
+                    };
+                    *rig = Rig::Axis(axis(parameters));
+                }
+            }
+            let text = model.to_toml();
+            assert_eq!(Model::from_toml(&text, "again").unwrap(), model, "{text}");
         }
     }
 }
