@@ -44,7 +44,7 @@ fn the_torque_that_comes_out_is_the_one_that_was_wanted() {
         // Shares of the torque that can be made up for.
         let small: Vec<f64> = sizes.iter().map(|size| 0.2 * size).collect();
         let effect = Effect::estimated(kind, on, Some(Motor::Right), &shape, &small).unwrap();
-        let fed = EffectFeedforward::new(&machine(on), &[effect.clone()], WHOLE).unwrap();
+        let fed = EffectFeedforward::new(&machine(on), std::slice::from_ref(&effect), WHOLE).unwrap();
         let law = effect.law(&machine(on));
         for moment in moments(50, rng) {
             let wanted = moment.torque_nm;
