@@ -62,6 +62,19 @@ impl RobotModel {
         }
         robot
     }
+
+    /// From asking for a torque to its acting, mean of both motors, s: the declared delay, and those of the effects,
+    /// where a lag counts by its time constant.
+    pub fn torque_delay_s(&self) -> f64 {
+        let delay_s = |effect: &Effect| match effect.id() {
+            "command_delay" => effect.get("delay_s").unwrap_or(0.0),
+            "actuator_lag" => effect.get("time_constant_s").unwrap_or(0.0),
+            _ => 0.0,
+        };
+        let of_motor =
+            |motor| -> f64 { self.effects.iter().filter(|effect| effect.is_in(motor)).map(delay_s).sum() };
+        self.actuation.delay_s + 0.5 * (of_motor(Motor::Left) + of_motor(Motor::Right))
+    }
 }
 
 impl AxisModel {

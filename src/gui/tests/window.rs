@@ -256,7 +256,7 @@ fn a_fit_of_a_motion_goes_into_the_axis_with_inertia_or_mass() {
         window.key_press_modifiers(Modifiers::COMMAND, Key::S);
         until(&mut window, "saving", |s| s["unsaved_changes"] == false);
         let saved = Model::from_toml(&std::fs::read_to_string(&file.0).unwrap(), "saved").unwrap();
-        let Rig::Axis(axis) = saved.rig else { panic!("{saved:?}") };
+        let Rig::Axis(axis) = &saved.rig else { panic!("{saved:?}") };
         let (AxisParameters::Linear { mass_kg: inertia, friction }
         | AxisParameters::Rotary { inertia_kg_m2: inertia, friction, .. }) = axis.parameters;
         let curve = *friction.unwrap().parameters();

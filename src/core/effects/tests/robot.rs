@@ -183,6 +183,29 @@ fn slosh_keeps_its_energy_at_most() {
 }
 
 #[test]
+fn delays_that_are_effects_count_in_the_margins() {
+    let paper = presets::paper();
+    let paper = paper.robot().unwrap();
+    let gain = crate::lqr::design(&paper.parameters.linear_model(), &paper.weights.unwrap()).unwrap().gain;
+    let margins = |robot: &RobotModel| {
+        let timing = crate::lqr::SampledLoop::of(robot);
+        crate::lqr::margins(&robot.parameters.linear_model(), &gain, &timing)
+    };
+    let mut declared = paper.clone();
+    declared.actuation.delay_s += 0.003;
+    for (id, key) in [("command_delay", "delay_s"), ("actuator_lag", "time_constant_s")] {
+        let effect = Effect::new(id, MachineKind::Robot, None, [(key, 0.003)]).unwrap();
+        let found = RobotModel { effects: vec![effect], ..paper.clone() };
+        assert!((found.torque_delay_s() - declared.actuation.delay_s).abs() < 1e-15, "{id}");
+        assert_eq!(margins(&found), margins(&declared), "{id}");
+        assert_ne!(margins(&found), margins(paper), "{id}");
+        let left = Effect::new(id, MachineKind::Robot, Some(Motor::Left), [(key, 0.003)]).unwrap();
+        let one = RobotModel { effects: vec![left], ..paper.clone() };
+        assert!((one.torque_delay_s() - paper.actuation.delay_s - 0.0015).abs() < 1e-15, "{id}");
+    }
+}
+
+#[test]
 fn the_sensors_effects_are_in_the_readings() {
     let paper = presets::paper();
     let paper = paper.robot().unwrap();
