@@ -4,11 +4,12 @@ use super::{drawn, everywhere, machine, moments};
 use crate::control::{BalanceController, ControlError, ControllerKind};
 use crate::effects::{Declared, Effect, EffectFeedforward, Feedforward, KINDS, Law, MachineKind, Moment};
 use crate::friction::Compensation;
-use crate::model_file::{RobotModel, presets};
+use crate::model_file::{AxisModel, AxisParameters, Model, Rig, RobotModel, presets};
 use crate::robot::Motor;
-use crate::simulate::{Simulation, SimulationSettings};
+use crate::simulate::{ControllerChoice, Experiment, Outcome, Scenario, Simulation, SimulationSettings, run};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use std::ops::ControlFlow;
 
 /// All of the friction, with a direction that turns over at once.
 const WHOLE: Compensation = Compensation { ratio: 1.0, smoothing_speed_rad_s: 1e-6 };
@@ -90,4 +91,30 @@ fn flqr_that_knows_the_cogging_balances_more_quietly_and_lqr_feeds_nothing_forwa
     assert!(matches!(refused, ControlError::NoFriction));
     let alone = RobotModel { friction: [None; 2], ..cogged.clone() };
     assert!(BalanceController::new(ControllerKind::Flqr, &alone, gain).is_ok());
+}
+
+#[test]
+fn a_shaft_whose_cogging_is_known_turns_more_evenly() {
+    let axis = |effects| AxisModel {
+        effects,
+        ..AxisModel::new(AxisParameters::Rotary {
+            inertia_kg_m2: 0.005,
+            gravity_torque_nm: 0.0,
+            friction: presets::paper().robot().unwrap().friction[0],
+        })
+    };
+    let cogging = [("order_1", 7.0), ("cos_1_nm", 0.02), ("sin_1_nm", 0.03)];
+    let cogging = Effect::new("cogging", MachineKind::Rotary, None, cogging).unwrap();
+    let model = |effects| Model { name: "shaft".to_owned(), rig: Rig::Axis(axis(effects)) };
+    let [bare, cogged] = [model(Vec::new()), model(vec![cogging])];
+    let spread = |declared: &Model, controller| {
+        let experiment = Experiment { seconds: 10.0, ..Experiment::new(Scenario::SpeedTracking, controller) };
+        let watch = &mut |_| ControlFlow::Continue(());
+        let Outcome::Bench(run) = run(&experiment, declared, &cogged, watch).unwrap() else { unreachable!() };
+        run.statistics_between(Motor::Left, [5.0, 10.0]).unwrap()[0].std
+    };
+    let [knows, ignores] = [&cogged, &bare].map(|declared| spread(declared, ControllerChoice::Flqr));
+    assert!(knows < 0.5 * ignores, "{knows} rad/s against {ignores} rad/s");
+    // Without feedforward it makes no difference what is known.
+    assert_eq!(spread(&cogged, ControllerChoice::Pi), spread(&bare, ControllerChoice::Pi));
 }
