@@ -35,11 +35,13 @@ wait $dump
 wait $emulator
 
 step "driven over CAN"
-flqr emulate $model --can vcan0 --json --seconds 40 > emulate.json &
+# Here a tick may take as long as it likes.
+{ cat $model; grep -q '^\[safety\]' $model || echo '[safety]'; } | sed 's/^\[safety\]/&\nimu_timeout_s = 1.0\nimu_frozen_s = 1.0\nmotor_timeout_s = 1.0\nlate_s = 1.0/' > patient.toml
+flqr emulate $model --can vcan0 --imu --json --seconds 40 > emulate.json &
 emulator=$!
 sleep 1
 imu=$(head -n 1 emulate.json | jq -r .imu)
-flqr drive can:vcan0 $model --imu "serial:$imu@115200" --arm --yes --seconds 2 --record driven.csv --json > drive.jsonl ||
+flqr drive can:vcan0 patient.toml --imu "serial:$imu@115200" --arm --yes --seconds 2 --record driven.csv --json > drive.jsonl ||
     echo "drive ended with $?"
 grep '"type":"event"' drive.jsonl || true
 tail -n 1 drive.jsonl

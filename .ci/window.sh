@@ -161,4 +161,22 @@ until_state 10 "the tune page is back" '.tab == "tune"'
 picture tune-light
 differ tune tune-light
 kill -0 "$program" 2>/dev/null || fail "the program ended by itself"
+
+echo "watching an emulated robot"
+kill "$program"
+wait "$program" 2>/dev/null || true
+rm -f "$state"
+LIBGL_ALWAYS_SOFTWARE=1 XDG_CONFIG_HOME="$scratch" "$binary" --tab robot --source emulated --state-out "$state" \
+    2>"$scratch/stderr" &
+program=$!
+started+=("$program")
+window=$(timeout 60 xdotool search --sync --onlyvisible --name '^flqr' | tail -1) || fail "no second window appeared"
+xdotool windowactivate --sync "$window" windowmove "$window" 0 0 windowsize "$window" 1278 776
+until_state 30 "the robot is heard" '.robot_tab.connection == "connected" and .robot_tab.rows > 2000'
+picture robot
+xdotool key ctrl+Return
+until_state 10 "the connection is closed" '.robot_tab.session == "closed"'
+picture robot-closed
+differ robot robot-closed
+kill -0 "$program" 2>/dev/null || fail "the second window ended by itself"
 echo "window.sh: passed; pictures and state in $out"

@@ -91,6 +91,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let options = SessionOptions {
         source: arguments.source.clone(),
         imu: arguments.wire.imu.clone(),
+        dbc: None,
         robot,
         mode: SessionMode::Drive { controller: Box::new(controller), excitation: arguments.excitation() },
         record: arguments.wire.record.clone(),

@@ -5,7 +5,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use clap::Args;
-use flqr_core::device::{Connection, SerialAddress, Session, SessionMode, SessionOptions, Source};
+use flqr_core::device::{Connection, Described, SerialAddress, Session, SessionMode, SessionOptions, Source};
+use flqr_core::link::dbc::Choice;
 use flqr_core::model_file::presets;
 
 use super::input;
@@ -22,6 +23,13 @@ pub(crate) struct Arguments {
     /// Model of the robot, for its [link] settings [default: the paper's robot]
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
+    /// Description (DBC file) of another robot's frames, one without LK motors; with --signal for what is to be read
+    #[arg(long, value_name = "FILE", requires = "signal")]
+    dbc: Option<PathBuf>,
+    /// What a signal of the DBC file is, as in pitch=Imu.Pitch or torque_left=CurrentLeft*0.32; the column of the robot
+    /// log, with or without its unit; repeatable
+    #[arg(long, value_name = "WHAT=[MESSAGE.]SIGNAL[*FACTOR]", requires = "dbc")]
+    signal: Vec<Choice>,
     /// End after so many seconds [default: at Ctrl+C, or with the recording]
     #[arg(long, value_parser = seconds)]
     seconds: Option<f64>,
@@ -31,6 +39,12 @@ pub(crate) struct Arguments {
     /// Seed of an emulated robot's noise
     #[arg(long, default_value_t = 1)]
     seed: u64,
+}
+
+impl Arguments {
+    fn described(&self) -> Option<Described> {
+        self.dbc.clone().map(|file| Described { file, signals: self.signal.clone() })
+    }
 }
 
 /// What `monitor` and `drive` have in common.
@@ -67,6 +81,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let options = SessionOptions {
         source: arguments.source.clone(),
         imu: arguments.wire.imu.clone(),
+        dbc: arguments.described(),
         robot,
         mode: SessionMode::Listen,
         record: arguments.wire.record.clone(),

@@ -4,7 +4,7 @@ use std::io::{self, Write};
 use std::time::Duration;
 
 use flqr_core::control::drive::{Check, CheckResult, Stage};
-use flqr_core::device::{Connection, Counters, EventKind, ImuStatus, MotorStatus, Status, Timing, Update};
+use flqr_core::device::{Connection, Counters, ImuStatus, MotorStatus, Status, Timing, Update};
 use flqr_core::record::Sample;
 use serde::Serialize;
 
@@ -21,6 +21,8 @@ pub(super) struct Lines<'a> {
     next: Duration,
     newest: Option<Sample>,
     checks: Vec<Check>,
+    /// Whether a recording has come to its end.
+    ended: bool,
 }
 
 /// A line of JSON.
@@ -121,17 +123,13 @@ struct RecordingLine {
 
 impl<'a> Lines<'a> {
     pub(super) fn new(output: &'a Output) -> Self {
-        Self { output, next: Duration::ZERO, newest: None, checks: Vec::new() }
+        Self { output, next: Duration::ZERO, newest: None, checks: Vec::new(), ended: false }
     }
 
     /// Events and checks that have changed at once, the status when it is due.
     pub(super) fn update(&mut self, update: &Update) -> Result<(), Failure> {
         for event in &update.events {
-            let kind = match event.kind {
-                EventKind::Note => "note",
-                EventKind::Warning => "warning",
-                EventKind::Stop => "stop",
-            };
+            let kind = event.kind.name();
             let line = Line::Event { time_s: event.time.as_secs_f64(), kind, text: &event.text };
             self.output.result(&line, |out| {
                 writeln!(out, "{:9.3} s  {kind}: {}", event.time.as_secs_f64(), event.text)
@@ -142,7 +140,8 @@ impl<'a> Lines<'a> {
             self.checks(&drive.checks)?;
         }
         let now = update.status.time;
-        if now >= self.next {
+        self.ended = update.status.connection == Connection::Ended;
+        if now >= self.next || self.ended {
             let interval = if self.output.is_json() { JSON_INTERVAL } else { TEXT_INTERVAL };
             // On a grid, so that a late line does not move all that follow.
             self.next = interval * (now.as_nanos() / interval.as_nanos() + 1) as u32;
@@ -155,6 +154,7 @@ impl<'a> Lines<'a> {
     pub(super) fn end(&self, time: Duration, stage: Option<Stage>) -> Result<(), Failure> {
         let (stopped_by, text) = match stage {
             Some(Stage::Stopped(reason)) => (Some(reason.name()), reason.to_string()),
+            _ if self.ended => (None, "the recording is over".to_owned()),
             _ => (None, "the time is over".to_owned()),
         };
         let line = Line::End { time_s: time.as_secs_f64(), stopped_by, text: text.clone() };
@@ -299,14 +299,21 @@ fn text(out: &mut dyn Write, status: &Status, newest: Option<&Sample>) -> io::Re
         )?;
     }
     let [left, right] = status.motors.map(|motor| motor.rate_hz);
-    let Counters { received_hz, bus_load, dropped, lost, errors, .. } = status.counters;
+    let Counters { received_hz, bus_load, dropped, lost, errors, late, reconnects, .. } = status.counters;
     let load = bus_load.map_or(String::new(), |load| format!(" ({:.0} % of the bus)", 100.0 * load));
     write!(
         out,
         "motors {left:.0} {right:.0} Hz  IMU {:.0} Hz  {received_hz:.0} frames/s{load}",
         status.imu.rate_hz
     )?;
-    for (name, count) in [("dropped", dropped), ("lost", lost), ("errors", errors)] {
+    let counts = [
+        ("dropped", dropped),
+        ("lost", lost),
+        ("late", late),
+        ("errors", errors),
+        ("reconnects", reconnects),
+    ];
+    for (name, count) in counts {
         if count > 0 {
             write!(out, "  {name} {count}")?;
         }

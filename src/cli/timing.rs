@@ -6,11 +6,14 @@ use std::time::Duration;
 
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
+use flqr_core::control::drive::Excitation;
 use flqr_core::control::{BalanceController, ControllerKind};
-use flqr_core::device::{LatenessSummary, Priority, TimingComparison, TimingPlan, compare_timing};
+use flqr_core::device::{
+    LatenessSummary, Priority, SessionMode, SessionOptions, Source, TimingComparison, TimingPlan,
+    compare_timing,
+};
 use flqr_core::lqr::{self, Weights};
 use flqr_core::model_file::presets;
-use flqr_core::simulate::{Simulation, SimulationSettings};
 use serde::Serialize;
 
 use super::output::{self, Failure, Output};
@@ -18,8 +21,8 @@ use super::progress::Progress;
 
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Length of each run, s
-    #[arg(long, default_value_t = 10, value_parser = RangedU64ValueParser::<u64>::new().range(1..=3600))]
+    /// Length of each run, s; the control loop is checked for 6 s before it drives
+    #[arg(long, default_value_t = 20, value_parser = RangedU64ValueParser::<u64>::new().range(1..=3600))]
     seconds: u64,
     /// Runs of each loop; they alternate
     #[arg(long, default_value_t = 5, value_parser = RangedU64ValueParser::<u64>::new().range(1..=1000))]
@@ -41,12 +44,12 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         run: Duration::from_secs(arguments.seconds),
         runs: arguments.runs as usize,
     };
-    let mut tick = control_tick()?;
     let progress = Progress::new("timing");
-    let comparison = compare_timing(plan, |_| tick(), &mut |done| {
+    let comparison = compare_timing(plan, &options()?, &mut |done| {
         progress.set(done as u64, arguments.runs);
         ControlFlow::Continue(())
     });
+    let comparison = comparison.map_err(Failure::from_error)?;
     drop(progress);
     if let Priority::Usual(reason) = &comparison.priority {
         output::complain(&format!("warning: {reason}"));
@@ -55,18 +58,23 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     output.result(&report, |out| print(out, &report, plan))
 }
 
-/// A tick with the work of a control loop: sensors, controller and the paper's robot under it.
-fn control_tick() -> Result<impl FnMut() + Send, Failure> {
+/// The paper's robot behind its real bytes, driven by FLQR.
+fn options() -> Result<SessionOptions, Failure> {
     let model = presets::paper();
     let robot = model.robot().expect("the paper's preset is a robot").clone();
     let weights: Weights = robot.weights.expect("a test finds weights in every preset");
     let design = lqr::design(&robot.parameters.linear_model(), &weights).map_err(Failure::from_error)?;
     let controller = BalanceController::new(ControllerKind::Flqr, &robot, design.gain);
-    let controller = controller.map_err(Failure::from_error)?;
-    let simulation = Simulation::new(&robot, controller, SimulationSettings::default());
-    let mut simulation = simulation.map_err(Failure::from_error)?;
-    Ok(move || {
-        std::hint::black_box(simulation.step());
+    let controller = Box::new(controller.map_err(Failure::from_error)?);
+    Ok(SessionOptions {
+        source: Source::Emulated,
+        imu: None,
+        dbc: None,
+        robot,
+        mode: SessionMode::Drive { controller, excitation: Excitation::Balance },
+        record: None,
+        seed: 1,
+        replay_speed: 1.0,
     })
 }
 

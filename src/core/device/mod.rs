@@ -40,8 +40,8 @@ pub use open_error::OpenError;
 pub use pacer::{Pacer, Priority, Tick, hurry};
 pub use recorder::{Recorder, RecorderError, RecorderInput};
 pub use session::{
-    Connection, Counters, DriveStatus, Event, EventKind, ImuStatus, MotorStatus, RecordingStatus,
-    SerialAddress, SerialAddressError, Session, SessionError, SessionMode, SessionOptions, SessionOrder,
-    Source, SourceError, Status, Timing, Update, Waker,
+    Connection, Counters, Described, DriveStatus, Event, EventKind, FileError, ImuStatus, MotorStatus,
+    RecordingStatus, SerialAddress, SerialAddressError, Session, SessionError, SessionMode, SessionOptions,
+    SessionOrder, Source, SourceError, Status, Timing, Update, Waker,
 };
 pub use timing::{LatenessSummary, TimingComparison, TimingPlan, compare_timing};

@@ -45,6 +45,11 @@ impl Pacer {
         self.due(self.clock.now())
     }
 
+    /// Reading of its clock.
+    pub fn now(&self) -> Duration {
+        self.clock.now()
+    }
+
     /// Lateness of all ticks so far.
     pub fn timing(&self) -> Timing {
         self.lateness.timing()

@@ -1,5 +1,6 @@
 //! A pseudo-terminal that another program opens as if it were a serial port.
 
+use std::fs::File;
 use std::io::{ErrorKind, Read, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -20,6 +21,8 @@ const PATIENCE: Duration = Duration::from_millis(100);
 pub(super) struct Pty {
     near: TTYPort,
     far: TTYPort,
+    /// The far end once more, for what its other handle cannot do.
+    door: File,
     name: String,
     /// None while it is dropped.
     queue: Option<SyncSender<Vec<u8>>>,
@@ -47,6 +50,7 @@ impl Pty {
         let mut writing = near.try_clone_native().map_err(|error| failed(error.to_string()))?;
         writing.set_timeout(PATIENCE).map_err(|error| failed(error.to_string()))?;
         let port = far.name().ok_or_else(|| failed("it has no name".to_owned()))?;
+        let door = File::open(&port).map_err(|error| failed(error.to_string()))?;
         let (queue, chunks) = sync_channel(WAITING);
         let progress = Arc::new(Progress::default());
         let shared = Arc::clone(&progress);
@@ -56,6 +60,7 @@ impl Pty {
         Ok(Self {
             near,
             far,
+            door,
             name: port,
             queue: Some(queue),
             progress,
@@ -120,9 +125,10 @@ impl Pty {
         self.release();
     }
 
-    /// Takes back the lock of a client that was killed.
+    /// Takes back the lock of a client that was killed. The serial library would take a shared lock of its own
+    /// instead, which keeps out every client that wants the port for itself.
     pub(super) fn release(&mut self) {
-        self.far.set_exclusive(false).unwrap_or(());
+        rustix::termios::ioctl_tiocnxcl(&self.door).unwrap_or(());
     }
 }
 

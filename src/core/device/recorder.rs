@@ -3,13 +3,13 @@
 use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use super::session::{Event, EventKind, RecordingStatus};
+use super::session::{Event, RecordingStatus};
 use crate::link::StampedFrame;
 use crate::link::jy901::Packet;
 use crate::record::BenchSample;
@@ -70,6 +70,8 @@ pub struct RecorderInput {
 struct Shared {
     ending: AtomicBool,
     lost: AtomicU64,
+    /// Items in the queue.
+    waiting: AtomicUsize,
     status: Mutex<RecordingStatus>,
 }
 
@@ -95,6 +97,7 @@ impl Recorder {
         let shared = Arc::new(Shared {
             ending: AtomicBool::new(false),
             lost: AtomicU64::new(0),
+            waiting: AtomicUsize::new(0),
             status: Mutex::new(status),
         });
         let (queue, items) = sync_channel(QUEUE);
@@ -166,16 +169,18 @@ impl RecorderInput {
 
     /// Something that happened.
     pub fn event(&self, event: &Event) {
-        let sort = match event.kind {
-            EventKind::Note => "note",
-            EventKind::Warning => "warning",
-            EventKind::Stop => "stop",
-        };
-        self.hand_over(Item::Event(event.time, format!("{sort}: {}", event.text)));
+        self.hand_over(Item::Event(event.time, format!("{}: {}", event.kind.name(), event.text)));
+    }
+
+    /// Whether half of the queue is free, for who can wait.
+    pub fn has_room(&self) -> bool {
+        self.shared.waiting.load(Ordering::Relaxed) < QUEUE / 2
     }
 
     fn hand_over(&self, item: Item) {
+        self.shared.waiting.fetch_add(1, Ordering::Relaxed);
         if self.queue.try_send(item).is_err() {
+            self.shared.waiting.fetch_sub(1, Ordering::Relaxed);
             self.shared.lost.fetch_add(1, Ordering::Relaxed);
         }
     }
@@ -219,6 +224,7 @@ impl Writer {
     fn take_in(&mut self, items: &Receiver<Item>) -> Result<(), String> {
         // Not more than the queue holds, so that the end is not put off for ever.
         for item in items.try_iter().take(QUEUE) {
+            self.shared.waiting.fetch_sub(1, Ordering::Relaxed);
             self.push(item);
             if self.files.longest() > BLOCK {
                 self.flush()?;
@@ -264,6 +270,7 @@ impl Writer {
     fn give_up(self, problem: String, items: &Receiver<Item>) {
         let left = self.pending.iter().sum::<u64>() + items.try_iter().count() as u64;
         self.shared.lost.fetch_add(left, Ordering::Relaxed);
+        self.shared.waiting.store(0, Ordering::Relaxed);
         self.shared.status().problem = Some(problem);
     }
 }
@@ -412,8 +419,12 @@ mod tests {
 
     fn input(queue: usize) -> (RecorderInput, Receiver<Item>) {
         let status = RecordingStatus { file: "run.csv".into(), rows: 0, frames: 0, bytes: 0, problem: None };
-        let shared =
-            Shared { ending: AtomicBool::new(true), lost: AtomicU64::new(0), status: Mutex::new(status) };
+        let shared = Shared {
+            ending: AtomicBool::new(true),
+            lost: AtomicU64::new(0),
+            waiting: AtomicUsize::new(0),
+            status: Mutex::new(status),
+        };
         let (queue, items) = sync_channel(queue);
         (RecorderInput { queue, shared: Arc::new(shared) }, items)
     }

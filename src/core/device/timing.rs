@@ -1,14 +1,16 @@
-//! What a control loop's ticks add to the lateness that the machine itself has.
+//! What a control loop adds to the lateness that the machine itself has.
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 use std::time::Duration;
-use std::{panic, thread};
+use std::{io, thread};
 
 use serde::Serialize;
 
 use super::clock::Clock;
-use super::pacer::{Pacer, Priority, Tick, hurry};
-use super::session::Timing;
+use super::pacer::{Pacer, Priority, hurry};
+use super::session::{Session, SessionError, SessionOptions, SessionOrder, Timing};
+use crate::control::drive::{CheckResult, DriveOrder, Stage};
 
 /// How long, and how often.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,40 +69,73 @@ impl TimingComparison {
     }
 }
 
-/// Alternates runs of a bare timer loop and of one that calls `tick`, on a thread that has hurried; `watch` is told of
-/// the number of runs done, and may break off.
+/// Alternates runs of a bare timer loop and of a session's control loop; `watch` is told of the number of runs done, and
+/// may break off.
 ///
-/// # Panics
-/// Where `tick` does.
+/// # Errors
+/// The session's, and a system that gives no thread.
 pub fn compare_timing(
     plan: TimingPlan,
-    mut tick: impl FnMut(Tick) + Send,
-    watch: &mut (dyn FnMut(usize) -> ControlFlow<()> + Send),
-) -> TimingComparison {
-    thread::scope(|scope| {
-        let runs = scope.spawn(|| {
-            let priority = hurry();
-            let mut comparison = TimingComparison { bare: Vec::new(), control: Vec::new(), priority };
-            for done in 0..plan.runs {
-                comparison.bare.push(run(plan, &mut |_| ()));
-                comparison.control.push(run(plan, &mut tick));
-                if watch(done + 1).is_break() {
-                    break;
-                }
-            }
-            comparison
-        });
-        runs.join().unwrap_or_else(|panicked| panic::resume_unwind(panicked))
-    })
+    options: &SessionOptions,
+    watch: &mut dyn FnMut(usize) -> ControlFlow<()>,
+) -> Result<TimingComparison, SessionError> {
+    alternate(plan.runs, &mut || Ok(bare(plan)?), &mut || driven(plan, options.clone()), watch)
 }
 
-fn run(plan: TimingPlan, tick: &mut dyn FnMut(Tick)) -> Timing {
-    let clock = Clock::start();
-    let mut pacer = Pacer::new(clock, plan.period);
-    while clock.now() < plan.run {
-        tick(pacer.wait());
+fn alternate(
+    runs: usize,
+    bare: &mut dyn FnMut() -> Result<(Timing, Priority), SessionError>,
+    control: &mut dyn FnMut() -> Result<Timing, SessionError>,
+    watch: &mut dyn FnMut(usize) -> ControlFlow<()>,
+) -> Result<TimingComparison, SessionError> {
+    let mut comparison =
+        TimingComparison { bare: Vec::new(), control: Vec::new(), priority: Priority::RealTime };
+    for done in 1..=runs {
+        let (timing, priority) = bare()?;
+        comparison.priority = priority;
+        comparison.bare.push(timing);
+        comparison.control.push(control()?);
+        if watch(done).is_break() {
+            break;
+        }
     }
-    pacer.timing()
+    Ok(comparison)
+}
+
+/// A loop with nothing in it, on a thread that has hurried as a session's does.
+fn bare(plan: TimingPlan) -> io::Result<(Timing, Priority)> {
+    let run = move || {
+        let priority = hurry();
+        let clock = Clock::start();
+        let mut pacer = Pacer::new(clock, plan.period);
+        while clock.now() < plan.run {
+            pacer.wait();
+        }
+        (pacer.timing(), priority)
+    };
+    thread::Builder::new()
+        .name("timer".to_owned())
+        .spawn(run)?
+        .join()
+        .map_err(|_| io::ErrorKind::Other.into())
+}
+
+/// A session as it is, which is checked, armed and driven, and what it says of its own loop.
+fn driven(plan: TimingPlan, options: SessionOptions) -> Result<Timing, SessionError> {
+    let clock = Clock::start();
+    let mut session = Session::open(options, Arc::new(|| {}))?;
+    session.send(SessionOrder::Drive(DriveOrder::Check));
+    let mut timing = Timing::default();
+    while clock.now() < plan.run && !session.has_died() {
+        let Some(update) = session.wait(Duration::from_millis(100)) else { continue };
+        timing = update.status.timing;
+        let Some(drive) = update.status.drive else { continue };
+        let passed = drive.checks.iter().all(|check| check.result == CheckResult::Passed);
+        if drive.stage == Stage::Checking && !drive.checks.is_empty() && passed {
+            session.send(SessionOrder::Drive(DriveOrder::Arm));
+        }
+    }
+    Ok(timing)
 }
 
 /// The middle value; of an even number the mean of the two in the middle. Not a number of none.
@@ -137,13 +172,28 @@ mod tests {
 
     #[test]
     fn runs_alternate_and_end_when_told_to() {
-        let plan = TimingPlan { period: Duration::from_millis(1), run: Duration::from_millis(5), runs: 9 };
-        let mut ticks = 0;
-        let comparison = compare_timing(plan, |_| ticks += 1, &mut |done| {
-            if done == 2 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        });
-        assert_eq!((comparison.bare.len(), comparison.control.len()), (2, 2));
-        assert_eq!(ticks, comparison.control.iter().map(|run| run.ticks).sum::<u64>());
-        assert!(ticks > 0);
+        let mut order = Vec::new();
+        let shared = std::cell::RefCell::new(&mut order);
+        let comparison = alternate(
+            9,
+            &mut || {
+                shared.borrow_mut().push("bare");
+                Ok((timing(1.0, 2.0, 3.0), Priority::RealTime))
+            },
+            &mut || {
+                shared.borrow_mut().push("control");
+                Ok(timing(1.0, 3.0, 4.0))
+            },
+            &mut |done| if done == 2 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) },
+        );
+        assert_eq!(comparison.unwrap().p99_ratio(), 1.5);
+        assert_eq!(order, ["bare", "control", "bare", "control"]);
+    }
+
+    #[test]
+    fn a_bare_loop_ticks_once_a_period() {
+        let plan = TimingPlan { period: Duration::from_millis(1), run: Duration::from_millis(20), runs: 1 };
+        let (timing, _) = bare(plan).unwrap();
+        assert!(timing.ticks > 0 && timing.ticks + timing.skipped <= 22, "{timing:?}");
     }
 }

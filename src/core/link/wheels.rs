@@ -34,6 +34,8 @@ const RAD_S_PER_DPS: f64 = TAU / 360.0;
 pub struct Wheels {
     settings: LinkSettings,
     wheels: [Wheel; 2],
+    /// Whether torques that this program sent are events too.
+    tells_sent: bool,
 }
 
 #[derive(Clone, Debug)]
@@ -43,7 +45,8 @@ struct Wheel {
     /// 1 or −1: its own sense as the robot drives forward.
     sign: f64,
     answers_apart: bool,
-    unanswered: Option<Unanswered>,
+    /// The newest command of each code.
+    unanswered: Vec<Unanswered>,
     temperature_c: Option<i8>,
     shaft: Option<Shaft>,
 }
@@ -74,11 +77,16 @@ impl Wheels {
             id: MotorId::new(settings.motor_ids()[motor as usize]),
             sign: settings.directions()[motor as usize].sign(),
             answers_apart: false,
-            unanswered: None,
+            unanswered: Vec::new(),
             temperature_c: None,
             shaft: None,
         };
-        Self { settings: *settings, wheels: Motor::BOTH.map(wheel) }
+        Self { settings: *settings, wheels: Motor::BOTH.map(wheel), tells_sent: false }
+    }
+
+    /// The motors of a recording: whoever commanded them, torques are events, the ones too that this program sent.
+    pub fn telling_sent(self) -> Self {
+        Self { tells_sent: true, ..self }
     }
 
     /// The frames of an order: one for each motor, or one for both where torques are commanded together. A torque
@@ -132,15 +140,16 @@ impl Wheels {
     fn heard(&mut self, stamped: &StampedFrame) -> Option<[Option<MotorEvent>; 2]> {
         let (address, bytes) = lk::address(&stamped.frame)?;
         let (time, ours) = (stamped.time, stamped.direction == Direction::Sent);
+        let tells = !ours || self.tells_sent;
         let (Address::CommandOrReply(id) | Address::Reply(id)) = address else {
-            return Some(self.asked_together(bytes, time, ours));
+            return Some(self.asked_together(bytes, time, ours).map(|event| event.filter(|_| tells)));
         };
         let wheel = self.wheels.iter_mut().find(|wheel| wheel.id == Some(id))?;
         wheel.answers_apart |= matches!(address, Address::Reply(_));
         if ours || (address == Address::CommandOrReply(id) && wheel.is_command(bytes, time)) {
-            return Some([wheel.asked(bytes, time, ours, &self.settings), None]);
+            return Some([wheel.asked(bytes, time, ours, &self.settings).filter(|_| tells), None]);
         }
-        wheel.unanswered = None;
+        wheel.unanswered.retain(|asked| asked.code != bytes[0]);
         wheel.answered(Reply::decode(bytes, self.settings.state_layout)?, time, &self.settings)
     }
 
@@ -160,7 +169,7 @@ impl Wheel {
         if Command::decode(bytes).is_none() {
             return false;
         }
-        let Some(asked) = self.unanswered.filter(|asked| {
+        let Some(asked) = self.unanswered.iter().find(|asked| {
             asked.code == bytes[0] && time.saturating_sub(asked.time) <= LATEST_REPLY && !self.answers_apart
         }) else {
             return true;
@@ -182,9 +191,10 @@ impl Wheel {
         ours: bool,
         settings: &LinkSettings,
     ) -> Option<MotorEvent> {
-        self.unanswered = Some(Unanswered { code: bytes[0], time, ours });
+        self.unanswered.retain(|asked| asked.code != bytes[0]);
+        self.unanswered.push(Unanswered { code: bytes[0], time, ours });
         match Command::decode(bytes)? {
-            Command::TorqueCurrent { iq } if !ours => {
+            Command::TorqueCurrent { iq } => {
                 Some(MotorEvent::Asked { motor: self.motor, time, current_a: self.current_a(iq, settings) })
             }
             _ => None,

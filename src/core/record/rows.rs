@@ -1,5 +1,6 @@
 //! A log of any length, row by row.
 
+use std::borrow::Cow;
 use std::collections::VecDeque;
 use std::io::BufRead;
 use std::time::Duration;
@@ -42,15 +43,16 @@ impl<'a, R: BufRead> LogRows<'a, R> {
     ///
     /// # Errors
     /// [`LogError`]; a log without `time_s` has no rows in time.
-    pub fn new(reader: R, source: &'a str, map: &ColumnMap) -> Result<Self, LogError> {
-        let mut lines = Lines::new(reader, source);
+    pub fn new(reader: R, source: impl Into<Cow<'a, str>>, map: &ColumnMap) -> Result<Self, LogError> {
+        let source = source.into();
+        let mut lines = Lines::new(reader, source.clone());
         let mut start = None;
         let header = Header::read(&mut lines, |comment| {
             start = start.or(std::str::from_utf8(comment).ok().and_then(recording::parse_start));
         })?;
-        let cells = Cells::new(Plan::new(&header, source, map)?, header);
+        let cells = Cells::new(Plan::new(&header, &source, map)?, header);
         let time = cells.plan.targets.iter().position(|target| target.name == "time_s");
-        let Some(time) = time else { return Err(no_time(source, &cells)) };
+        let Some(time) = time else { return Err(no_time(&source, &cells)) };
         let row = Vec::with_capacity(cells.plan.targets.len());
         let last_s = f64::NEG_INFINITY;
         let (later, due) = (VecDeque::new(), VecDeque::new());

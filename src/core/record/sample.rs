@@ -51,6 +51,36 @@ impl Sample {
         }
     }
 
+    /// A row of a robot log: values in the order of [`Sample::COLUMNS`].
+    pub fn from_row(row: [f64; 11]) -> Self {
+        let [
+            time_s,
+            x_m,
+            x_dot_m_s,
+            pitch_rad,
+            pitch_rate_rad_s,
+            motor_angle_left_rad,
+            motor_angle_right_rad,
+            motor_speed_left_rad_s,
+            motor_speed_right_rad_s,
+            torque_left_nm,
+            torque_right_nm,
+        ] = row;
+        Self {
+            time_s,
+            x_m,
+            x_dot_m_s,
+            pitch_rad,
+            pitch_rate_rad_s,
+            motor_angle_left_rad,
+            motor_angle_right_rad,
+            motor_speed_left_rad_s,
+            motor_speed_right_rad_s,
+            torque_left_nm,
+            torque_right_nm,
+        }
+    }
+
     /// Names of the columns of a robot log, in the order of [`Sample::to_row`].
     pub const COLUMNS: [&'static str; 11] = schema::ROBOT;
 

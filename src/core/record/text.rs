@@ -1,5 +1,6 @@
 //! The text level of a log: lines, comments, cells, header.
 
+use std::borrow::Cow;
 use std::io::{self, BufRead, Read};
 
 use super::{LogError, recording};
@@ -11,7 +12,7 @@ const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 /// Lines of CSV text with their numbers; blank ones are left out.
 pub(super) struct Lines<'a, R> {
     reader: R,
-    file: &'a str,
+    file: Cow<'a, str>,
     buffer: Vec<u8>,
     line: u64,
     bytes: u64,
@@ -36,8 +37,8 @@ pub(super) struct Row<'a> {
 }
 
 impl<'a, R: BufRead> Lines<'a, R> {
-    pub(super) fn new(reader: R, file: &'a str) -> Self {
-        Self { reader, file, buffer: Vec::new(), line: 0, bytes: 0, grows: false }
+    pub(super) fn new(reader: R, file: impl Into<Cow<'a, str>>) -> Self {
+        Self { reader, file: file.into(), buffer: Vec::new(), line: 0, bytes: 0, grows: false }
     }
 
     /// Line that was read last, from 1.
@@ -112,7 +113,7 @@ impl<'a, R: BufRead> Lines<'a, R> {
         let read = self.reader.by_ref().take(room as u64).read_until(b'\n', &mut self.buffer);
         let count = read.map_err(|error| self.io_error(&error))?;
         if self.buffer.len() > ROW_LIMIT_BYTES {
-            let file = self.file.to_owned();
+            let file = self.file.to_string();
             return Err(LogError::RowTooLong { file, line: start, limit: ROW_LIMIT_BYTES });
         }
         self.bytes += count as u64;
@@ -121,7 +122,7 @@ impl<'a, R: BufRead> Lines<'a, R> {
     }
 
     fn io_error(&self, error: &io::Error) -> LogError {
-        let file = self.file.to_owned();
+        let file = self.file.to_string();
         if error.kind() == io::ErrorKind::IsADirectory {
             return LogError::Folder { file };
         }
@@ -169,12 +170,12 @@ impl Header {
         lines: &mut Lines<R>,
         mut comment: impl FnMut(&[u8]),
     ) -> Result<Self, LogError> {
-        let file = lines.file;
+        let file = lines.file.to_string();
         loop {
             match lines.next_line()? {
-                None => return Err(LogError::Empty { file: file.to_owned() }),
+                None => return Err(LogError::Empty { file }),
                 Some(Line::Comment(text)) => comment(text),
-                Some(Line::Row(row)) => return Self::parse(&row, file),
+                Some(Line::Row(row)) => return Self::parse(&row, &file),
             }
         }
     }

@@ -117,8 +117,8 @@ fn bus_ui(counters: &Counters, ui: &mut Ui) {
     ] {
         row_ui(ui, name, &count.to_string(), (count > 0).then_some(warning)).on_hover_text(match name {
             "dropped" => "Frames that the system or the adapter dropped before they were read",
-            "lost" => "Frames that came but did not reach the window or the recording",
-            "late" => "Readings that came after the tick they were for",
+            "lost" => "Frames and samples that did not reach the control loop, the window or the recording",
+            "late" => "Ticks of the control loop that came a period late or later",
             "errors" => "Error frames and damaged lines",
             _ => "Times the bus was lost and came back",
         });

@@ -1,9 +1,14 @@
 //! What to connect to, and what may be done with it.
 
-use egui::{Button, ComboBox, Grid, RichText, TextEdit, Ui, vec2};
+use egui::{Button, CollapsingHeader, ComboBox, Grid, RichText, TextEdit, Ui, vec2};
 use flqr_core::control::drive::Excitation;
-use flqr_core::device::{Interfaces, SerialAddress, SessionMode, SessionOptions, Source as DeviceSource};
+use flqr_core::device::{
+    Described, Interfaces, SerialAddress, SessionMode, SessionOptions, Source as DeviceSource,
+};
 
+use flqr_core::link::dbc::Choice;
+
+use super::link::sentence;
 use super::offers::{can_ui, ports_ui};
 use crate::command::{Command, FilePurpose, Source};
 use crate::context::ViewContext;
@@ -69,6 +74,9 @@ pub(crate) struct ConnectionForm {
     pub(crate) imu_baud: String,
     pub(crate) replay: String,
     pub(super) replay_speed: f64,
+    /// Path of a DBC file and which of its signals are what; empty of a robot with LK motors.
+    dbc: String,
+    signals: String,
     pub(super) may_drive: bool,
     task: Task,
     air_s: f64,
@@ -86,6 +94,8 @@ impl Default for ConnectionForm {
             imu_baud: "115200".to_owned(),
             replay: String::new(),
             replay_speed: 1.0,
+            dbc: String::new(),
+            signals: String::new(),
             may_drive: false,
             task: Task::Balance,
             air_s: 120.0,
@@ -134,6 +144,7 @@ impl ConnectionForm {
         Ok(SessionOptions {
             source: self.source(source)?,
             imu: self.imu(source)?,
+            dbc: self.described(source)?,
             robot,
             mode,
             record: None,
@@ -169,6 +180,24 @@ impl ConnectionForm {
         Ok(Some(SerialAddress { port: port.to_owned(), baud: rate(&self.imu_baud, "The IMU's baud rate")? }))
     }
 
+    /// Another robot, where its frames come over a wire or from a recording.
+    fn described(&self, source: Source) -> Result<Option<Described>, String> {
+        let file = self.dbc.trim();
+        if file.is_empty() || !matches!(source, Source::Can | Source::Slcan | Source::Replay) {
+            return Ok(None);
+        }
+        let words = self.signals.split([' ', ',', ';', '\n']).filter(|word| !word.is_empty());
+        let signals = words.map(|word| word.parse::<Choice>().map_err(|error| sentence(&error.to_string())));
+        let signals = signals.collect::<Result<Vec<_>, _>>()?;
+        if signals.is_empty() {
+            return Err("No signal of the DBC file is chosen: type for instance pitch=Imu.Pitch.".to_owned());
+        }
+        if self.may_drive && source != Source::Replay {
+            return Err("A robot of a DBC file can be watched only: choose “Listen only”.".to_owned());
+        }
+        Ok(Some(Described { file: file.into(), signals }))
+    }
+
     fn excitation(&self) -> Excitation {
         match self.task {
             Task::Balance => Excitation::Balance,
@@ -201,6 +230,9 @@ impl ConnectionForm {
         }
         if wired {
             self.imu_ui(found, ui);
+        }
+        if wired || context.source == Source::Replay {
+            self.dbc_ui(ui);
         }
         if context.source != Source::Replay {
             self.mode_ui(context, ui);
@@ -263,6 +295,21 @@ impl ConnectionForm {
         ui.horizontal(|ui| {
             ui.label("speed");
             speed_ui(&mut self.replay_speed, ui);
+        });
+    }
+
+    fn dbc_ui(&mut self, ui: &mut Ui) {
+        CollapsingHeader::new("Another robot (DBC file)").show(ui, |ui| {
+            hint_ui(ui, "For a robot without LK motors: the file that describes its frames, and what its signals are.");
+            let field = |text, hint| TextEdit::singleline(text).hint_text(hint).desired_width(f32::INFINITY);
+            ui.add(field(&mut self.dbc, "none: LK motors")).accessible_name("DBC file");
+            let signals = TextEdit::multiline(&mut self.signals)
+                .hint_text("pitch=Imu.Pitch\nmotor_speed_left=SpeedLeft\nmotor_speed_right=SpeedRight")
+                .desired_rows(3)
+                .desired_width(f32::INFINITY);
+            ui.add(signals).accessible_name("signals of the DBC file").on_hover_text(
+                "One a line: a column of the robot log, =, and MESSAGE.SIGNAL, with *FACTOR where its unit does not tell",
+            );
         });
     }
 

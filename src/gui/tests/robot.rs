@@ -7,7 +7,7 @@ mod common;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use common::{SIZE, Window, click, enter, next, open, options, random_input, state, until};
+use common::{SIZE, TempFile, Window, click, enter, next, open, options, random_input, state, until};
 use egui::accesskit::Role;
 use egui::{Event as Input, Key, Modifiers, Vec2, vec2};
 use egui_kittest::kittest::Queryable;
@@ -713,6 +713,51 @@ fn a_replay_is_held_and_its_speed_set() {
         orders.iter().any(|order| matches!(order, SessionOrder::ReplaySpeed(speed) if *speed > 1.0)),
         "{orders:?}"
     );
+}
+
+#[test]
+fn a_recording_is_replayed_to_its_end() {
+    let times = (0..300).map(|ms| format!("{:.3},0.1,0.2,0.03,0,1,2,3,4,5,6\n", f64::from(ms) * 1e-3));
+    let text = format!("{}\n{}", Sample::COLUMNS.join(","), times.collect::<String>());
+    let recording = TempFile::new("replay.csv", &text);
+    let source = Some(format!("replay:{}", recording.name()).parse().unwrap());
+    let mut window = open(WindowOptions { source, ..options(Tab::Robot) }, SIZE);
+    let ended = until(&mut window, "the end", |s| s["robot_tab"]["connection"] == "ended");
+    assert_eq!((&ended["robot_tab"]["rows"], &ended["robot_tab"]["skipped_rows"]), (&300.into(), &0.into()));
+    assert!((ended["robot_tab"]["end_s"].as_f64().unwrap() - 0.299).abs() < 1e-9, "{ended:#}");
+    assert_eq!(ended["robot_tab"]["last_event"], "the recording has come to its end: 300 rows and 0 frames");
+    window.get_by_label_contains("the recording has come to its end");
+    // Once more from the form.
+    click(&mut window, "Close");
+    click(&mut window, "Replay");
+    until(&mut window, "the end", |s| s["robot_tab"]["connection"] == "ended");
+    window.get_by_label("Close");
+}
+
+#[test]
+fn another_robot_is_described_by_a_dbc_file() {
+    let script = Script::default();
+    let window_options = WindowOptions { devices: Arc::new(script.clone()), ..options(Tab::Robot) };
+    let mut window = open(window_options, SIZE);
+    click(&mut window, "CAN");
+    click(&mut window, "Another robot (DBC file)");
+    // The header opens over some frames.
+    window.run_steps(20);
+    enter(&mut window, "DBC file", "/data/other.dbc");
+    window.get_by_label_contains("No signal of the DBC file is chosen");
+    enter(&mut window, "signals of the DBC file", "lean=Lean");
+    window.get_by_label_contains("There is no quantity `lean`");
+    enter(&mut window, "signals of the DBC file", "pitch=Body.Lean\nmotor_speed_left=Left*-1, torque_left=T");
+    click(&mut window, "May drive");
+    window.get_by_label_contains("can be watched only");
+    click(&mut window, "Listen only");
+    click(&mut window, "Connect");
+    until(&mut window, "connecting", |s| s["robot_tab"]["session"] == "open");
+    let opened = script.with(|shared| shared.opened.pop()).unwrap();
+    let described = opened.dbc.unwrap();
+    let signals = ["pitch_rad=Body.Lean", "motor_speed_left_rad_s=Left*-1", "torque_left_nm=T"];
+    assert_eq!(described.file.to_str(), Some("/data/other.dbc"));
+    assert_eq!(described.signals, signals.map(|text| text.parse().unwrap()));
 }
 
 #[test]

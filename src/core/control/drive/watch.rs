@@ -226,9 +226,8 @@ fn age_s(now: Duration, time: Duration) -> f64 {
 fn is_finite(event: &MotorEvent) -> bool {
     match event {
         MotorEvent::State(_, state) => {
-            [state.angle_rad, state.speed_rad_s, state.current_a, state.temperature_c]
-                .iter()
-                .all(|v| v.is_finite())
+            // Its temperature may not be known.
+            [state.angle_rad, state.speed_rad_s, state.current_a].iter().all(|v| v.is_finite())
         }
         MotorEvent::Health(_, health) => health.temperature_c.is_finite() && health.voltage_v.is_finite(),
         MotorEvent::Acknowledged { .. } | MotorEvent::TurnsLost { .. } => true,

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use super::tally::Tally;
 use crate::device::RecorderInput;
+use crate::link::dbc::{Heard, SignalMap};
 use crate::link::jy901::Decoder;
 use crate::link::{FrameId, FrameKind, ImuAssembler, ImuReading, MotorEvent, StampedFrame, Wheels};
 use crate::robot::LinkSettings;
@@ -12,9 +13,17 @@ use crate::robot::LinkSettings;
 /// Ids that are remembered for hints.
 const MOST_IDS: usize = 12;
 
+/// What a DBC file tells of the frames.
+pub(super) struct Signals {
+    pub(super) map: SignalMap,
+    /// Of which motors currents are known; the others' stand for torques, or for nothing.
+    pub(super) tells_current: [bool; 2],
+}
+
 /// Decoders of both lines, and what they gave since it was last cleared.
 pub(super) struct Hearing {
     pub(super) wheels: Wheels,
+    signals: Option<Signals>,
     decoder: Decoder,
     assembler: ImuAssembler,
     pub(super) motors: Vec<MotorEvent>,
@@ -23,9 +32,10 @@ pub(super) struct Hearing {
 }
 
 impl Hearing {
-    pub(super) fn new(settings: &LinkSettings) -> Self {
+    pub(super) fn new(settings: &LinkSettings, signals: Option<Signals>) -> Self {
         Self {
             wheels: Wheels::new(settings),
+            signals,
             decoder: Decoder::new(),
             assembler: ImuAssembler::new(settings),
             motors: Vec::new(),
@@ -53,9 +63,49 @@ impl Hearing {
         if frame.frame.kind() == FrameKind::Data && self.ids.len() < MOST_IDS {
             self.ids.insert(frame.frame.id());
         }
+        if self.signals.is_some() {
+            return self.described(frame, tally);
+        }
         for event in self.wheels.receive(frame) {
             tally.motor(&event);
             self.motors.push(event);
+        }
+    }
+
+    /// A frame of a robot that a DBC file describes.
+    fn described(&mut self, frame: &StampedFrame, tally: &mut Tally) {
+        let Some(Signals { map, tells_current }) = &mut self.signals else { return };
+        for heard in map.receive(frame) {
+            match heard {
+                Heard::Motor(event) => {
+                    self.motors.push(event);
+                    let mut shown = event;
+                    if let MotorEvent::State(motor, state) = &mut shown
+                        && !tells_current[*motor as usize]
+                    {
+                        state.current_a = f64::NAN;
+                    }
+                    tally.motor(&shown);
+                }
+                Heard::Imu(reading) => {
+                    tally.imu(&reading);
+                    self.imu.push(reading);
+                }
+            }
+        }
+    }
+
+    /// Whether frames have the pitch, so that the IMU of a recording is not heard beside them.
+    fn frames_have_pitch(&self) -> bool {
+        self.signals.as_ref().is_some_and(|signals| signals.map.has_pitch())
+    }
+
+    /// What frames are to be of.
+    pub(super) fn wanted(&self) -> &'static str {
+        if self.signals.is_some() {
+            "none of them has a chosen signal: check the DBC file and the choice of signals"
+        } else {
+            "none of the robot's motors: check left_motor_id and right_motor_id in [link]"
         }
     }
 
@@ -72,7 +122,9 @@ impl Hearing {
             if let Some(recorder) = recorder {
                 recorder.imu_packet(time, &packet);
             }
-            if let Some(reading) = self.assembler.push(time, &packet) {
+            if let Some(reading) = self.assembler.push(time, &packet)
+                && !self.frames_have_pitch()
+            {
                 tally.imu(&reading);
                 self.imu.push(reading);
             }

@@ -1,7 +1,8 @@
-//! What the control loop hears and sends through: a wire with its threads, or a robot in memory.
+//! What the control loop hears and sends through: a wire with its threads, a robot in memory, or a recording.
 
 use std::time::Duration;
 
+use super::player::Player;
 use super::types::SessionOrder;
 use super::wire::{Inbox, Wire};
 use crate::link::{Emulator, Frame};
@@ -17,6 +18,8 @@ pub(super) enum Link {
     Wire(Wire),
     /// A robot in memory, moved on by the control loop itself.
     Emulated(Box<Emulator>),
+    /// A recording, which is played by a loop of its own.
+    Replay(Box<Player>),
 }
 
 impl Link {
@@ -24,6 +27,7 @@ impl Link {
     pub(super) fn collect(&mut self, now: Duration, heard: &mut Heard) {
         match self {
             Self::Wire(wire) => wire.collect(&mut heard.inbox),
+            Self::Replay(_) => {}
             Self::Emulated(robot) => {
                 robot.advance(now);
                 heard.inbox.frames.clear();
@@ -45,6 +49,7 @@ impl Link {
                 robot.receive(now, &frame);
                 !robot.bus_is_off()
             }
+            Self::Replay(_) => false,
         }
     }
 
@@ -55,9 +60,13 @@ impl Link {
 
     /// Orders to the robot behind the link.
     pub(super) fn order(&mut self, order: &SessionOrder) {
-        // Nothing that a wire could do.
-        if let (Self::Emulated(robot), SessionOrder::Push { force_n, duration_s }) = (self, order) {
-            robot.push(*force_n, *duration_s);
+        match (self, order) {
+            (Self::Emulated(robot), SessionOrder::Push { force_n, duration_s }) => {
+                robot.push(*force_n, *duration_s);
+            }
+            (Self::Replay(player), order) => player.order(order),
+            // Nothing that a wire could do.
+            _ => {}
         }
     }
 
@@ -66,6 +75,7 @@ impl Link {
         match self {
             Self::Wire(wire) => wire.problem(),
             Self::Emulated(robot) => robot.bus_is_off().then(|| "bus off".to_owned()),
+            Self::Replay(_) => None,
         }
     }
 
@@ -82,6 +92,7 @@ impl Link {
                 [health.dropped(), health.errors(), health.reconnects()]
             }
             Self::Emulated(_) => [0; 3],
+            Self::Replay(player) => [0, player.counts().damaged, 0],
         }
     }
 }

@@ -1,22 +1,27 @@
 //! A robot that is watched or driven, on threads of its own.
 
+mod files;
 mod hearing;
 mod link;
+mod player;
 mod publisher;
 mod rate;
+mod replaying;
 mod tally;
 mod types;
 mod wire;
 mod worker;
 
+pub use files::FileError;
 pub use publisher::Waker;
 pub use types::{
-    Connection, Counters, DriveStatus, Event, EventKind, ImuStatus, MotorStatus, RecordingStatus,
+    Connection, Counters, Described, DriveStatus, Event, EventKind, ImuStatus, MotorStatus, RecordingStatus,
     SerialAddress, SerialAddressError, SessionMode, SessionOptions, SessionOrder, Source, SourceError,
     Status, Timing, Update,
 };
 
 use std::collections::VecDeque;
+use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::thread::{Builder, JoinHandle};
 use std::time::{Duration, SystemTime};
@@ -24,13 +29,17 @@ use std::time::{Duration, SystemTime};
 use super::{Clock, OpenError, Pacer, hurry, open_bus, open_imu};
 use crate::control::drive::{Drive, DriveError, DriveSettings, Excitation, Listener};
 use crate::control::{BalanceController, ControlError, ControllerKind};
+use crate::link::dbc::{self, Dbc, SignalMap};
 use crate::link::{Emulator, EmulatorSettings, MotorOrder, Wheels};
 use crate::lqr;
 use crate::model_file::RobotModel;
+use crate::record::ReplayError;
 use crate::record::recording::About;
+use crate::robot::Motor;
 use crate::simulate::SimulationError;
-use hearing::Hearing;
+use hearing::{Hearing, Signals};
 use link::{Heard, Link};
+use player::Player;
 use publisher::Publisher;
 use tally::Tally;
 use wire::Wire;
@@ -58,11 +67,28 @@ pub enum SessionError {
     /// A recording that cannot be made.
     #[error("{0}")]
     Recording(String),
-    /// Recordings are read as files.
+    /// A recording that cannot be replayed.
+    #[error(transparent)]
+    Replay(#[from] ReplayError),
+    /// A file that cannot be read.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// A recording has no motors.
     #[error(
-        "recordings cannot be replayed yet: open the robot log as a file, or convert it with flqr convert"
+        "a recording can be watched but not driven: give can:INTERFACE, slcan:PORT@BITRATE or emulated in place of {source_name}"
     )]
-    Replay,
+    ReplayDriven {
+        /// The recording.
+        source_name: String,
+    },
+    /// A DBC file, or a choice of its signals, that does not serve.
+    #[error("{}: {problem}", file.display())]
+    Dbc {
+        /// The file.
+        file: PathBuf,
+        /// What is wrong, and the mend.
+        problem: String,
+    },
     /// The system gives no thread.
     #[error("no thread for the robot: {0}")]
     Thread(#[from] std::io::Error),
@@ -87,6 +113,8 @@ impl Session {
     /// [`SessionError`]; then nothing is left open.
     pub fn open(options: SessionOptions, wake: Waker) -> Result<Self, SessionError> {
         let clock = Clock::start();
+        let signals = options.dbc.as_ref().map(|described| signals(described, &options)).transpose()?;
+        let mut hearing = Hearing::new(&options.robot.link, signals);
         let (order_sender, orders) = sync_channel(ORDERS);
         let (update_sender, updates) = sync_channel(UPDATES);
         let link = open_link(&options, clock)?;
@@ -109,10 +137,13 @@ impl Session {
         if let Some(name) = &options.record {
             recording.start(name).map_err(SessionError::Recording)?;
         }
+        if matches!(options.source, Source::Replay { .. }) {
+            hearing.wheels = hearing.wheels.telling_sent();
+        }
         let worker = Worker {
             link,
             role: role(&options)?,
-            hearing: Hearing::new(&options.robot.link),
+            hearing,
             heard: Heard::default(),
             pacer: Pacer::new(clock, TICK),
             tally: Tally::new(options.source.bit_rate()),
@@ -122,6 +153,10 @@ impl Session {
             publisher: Publisher::new(update_sender, wake),
         };
         let thread = Builder::new().name("control".to_owned()).spawn(move || {
+            // A recording is in no hurry, and must not keep a core from everybody else.
+            if matches!(worker.link, Link::Replay(_)) {
+                return worker.replay();
+            }
             hurry();
             worker.work();
         })?;
@@ -192,7 +227,12 @@ fn open_link(options: &SessionOptions, clock: Clock) -> Result<Link, SessionErro
             };
             Ok(Link::Emulated(Box::new(Emulator::new(&options.robot, settings)?)))
         }
-        Source::Replay { .. } => Err(SessionError::Replay),
+        Source::Replay { .. } if !listens => {
+            Err(SessionError::ReplayDriven { source_name: options.source.to_string() })
+        }
+        Source::Replay { file } => {
+            Ok(Link::Replay(Box::new(Player::open(file, options.replay_speed, clock)?)))
+        }
     }
 }
 
@@ -205,9 +245,52 @@ fn on_board(robot: &RobotModel) -> Result<Option<BalanceController>, ControlErro
     gain.map(|design| BalanceController::new(kind, robot, design.gain)).transpose()
 }
 
+/// The chosen signals of a robot that a DBC file describes.
+fn signals(described: &Described, options: &SessionOptions) -> Result<Signals, SessionError> {
+    let refuse = |problem: String| SessionError::Dbc { file: described.file.clone(), problem };
+    if options.mode != SessionMode::Listen {
+        let problem = "a robot that a DBC file describes can be watched only, to be driven it has to speak the LK \
+                       protocol: leave the file out, or listen";
+        return Err(refuse(problem.to_owned()));
+    }
+    let text = files::read_text(&described.file, dbc::LARGEST_FILE_BYTES + 1)?;
+    let file = Dbc::parse(&text).map_err(|error| refuse(error.to_string()))?;
+    let constant_nm_a = torque_constant(options);
+    let map = SignalMap::new(&file, &described.signals, constant_nm_a);
+    let map = map.map_err(|error| refuse(error.to_string()))?;
+    if let Some(motor) = map.missing_motor() {
+        return Err(refuse(format!(
+            "no signal is chosen for the motion of the {motor} motor: add motor_speed_{motor}_rad_s=SIGNAL or \
+             motor_angle_{motor}_rad=SIGNAL"
+        )));
+    }
+    if map.has_pitch() && options.imu.is_some() {
+        let problem = "the pitch is to come from its signals and from the IMU: leave one of the two out";
+        return Err(refuse(problem.to_owned()));
+    }
+    let has_constant = options.robot.link.torque_constant_nm_a.is_some();
+    let tells_current = Motor::BOTH.map(|motor| has_constant && map.has_torque(motor));
+    Ok(Signals { map, tells_current })
+}
+
+/// Torque constant, N m/A. A robot that a DBC file describes tells torques: without a constant, each ampere that they
+/// are turned into is one newton metre.
+fn torque_constant(options: &SessionOptions) -> f64 {
+    options.robot.link.torque_constant_nm_a.unwrap_or(1.0)
+}
+
+fn listener(options: &SessionOptions) -> Listener {
+    if options.dbc.is_none() {
+        return Listener::new(&options.robot);
+    }
+    let mut robot = options.robot.clone();
+    robot.link.torque_constant_nm_a = Some(torque_constant(options));
+    Listener::new(&robot)
+}
+
 fn role(options: &SessionOptions) -> Result<Role, DriveError> {
     Ok(match &options.mode {
-        SessionMode::Listen => Role::Listen(Box::new(Listener::new(&options.robot))),
+        SessionMode::Listen => Role::Listen(Box::new(listener(options))),
         SessionMode::Drive { controller, excitation } => Role::Drive(Box::new(Drive::new(
             &options.robot,
             (**controller).clone(),

@@ -21,6 +21,8 @@ pub(super) struct Publisher {
     pub(super) samples: Vec<Sample>,
     frames: VecDeque<StampedFrame>,
     pub(super) events: Vec<Event>,
+    /// Whether the last update could not be offered.
+    held: bool,
 }
 
 impl Publisher {
@@ -33,6 +35,7 @@ impl Publisher {
             samples: Vec::new(),
             frames: VecDeque::new(),
             events: Vec::new(),
+            held: false,
         }
     }
 
@@ -56,6 +59,28 @@ impl Publisher {
     /// Sends an update; gives the number of samples that did not get through because nobody takes them.
     /// Events wait for the next one.
     pub(super) fn publish(&mut self, status: Status) -> u64 {
+        self.send(status).map_or(0, |update| {
+            self.events = update.events;
+            update.samples.len() as u64
+        })
+    }
+
+    /// Sends an update; where nobody takes it, all of it waits for the next one.
+    pub(super) fn offer(&mut self, status: Status) {
+        let refused = self.send(status);
+        self.held = refused.is_some();
+        if let Some(update) = refused {
+            (self.samples, self.frames, self.events) = (update.samples, update.frames.into(), update.events);
+        }
+    }
+
+    /// Whether what was offered waits.
+    pub(super) fn is_held(&self) -> bool {
+        self.held
+    }
+
+    /// Sends an update; gives it back where nobody takes it.
+    fn send(&mut self, status: Status) -> Option<Update> {
         let update = Update {
             samples: std::mem::take(&mut self.samples),
             frames: std::mem::take(&mut self.frames).into(),
@@ -65,12 +90,9 @@ impl Publisher {
         match self.updates.try_send(update) {
             Ok(()) => {
                 (self.wake)();
-                0
+                None
             }
-            Err(TrySendError::Full(update) | TrySendError::Disconnected(update)) => {
-                self.events = update.events;
-                update.samples.len() as u64
-            }
+            Err(TrySendError::Full(update) | TrySendError::Disconnected(update)) => Some(update),
         }
     }
 }

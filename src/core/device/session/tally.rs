@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use super::rate::Rate;
 use super::types::{Counters, ImuStatus, MotorStatus};
+use crate::device::Tick;
 use crate::link::{Direction, FrameKind, ImuReading, MotorEvent, StampedFrame, bus_load};
 use crate::record::Sample;
 use crate::record::recording::Row;
@@ -70,8 +71,10 @@ impl Tally {
                 tally.heard = Some(state.time);
                 tally.rate.add(state.time, 1.0);
                 tally.answered += 1;
-                tally.status.temperature_c = Some(state.temperature_c);
-                tally.status.current_a = Some(state.current_a);
+                // Either may not be known of a robot that a DBC file describes.
+                let known = |value: f64| Some(value).filter(|value| value.is_finite());
+                tally.status.temperature_c = known(state.temperature_c);
+                tally.status.current_a = known(state.current_a);
             }
             MotorEvent::Health(motor, health) => {
                 let tally = &mut self.motors[*motor as usize];
@@ -90,6 +93,12 @@ impl Tally {
         }
     }
 
+    /// A tick of the control loop.
+    pub(super) fn tick(&mut self, tick: &Tick) {
+        // The ticks that it covers are left out; it is itself the one that came late.
+        self.counters.late += u64::from(tick.skipped > 0);
+    }
+
     pub(super) fn lost(&mut self, count: u64) {
         self.counters.lost += count;
     }
@@ -105,6 +114,13 @@ impl Tally {
     pub(super) fn imu_packets(&mut self, intact: u64, corrupted: u64, stray_bytes: u64) {
         let status = &mut self.imu.status;
         (status.packets, status.corrupted, status.stray_bytes) = (intact, corrupted, stray_bytes);
+    }
+
+    /// A row of a recording that is replayed: what its frames do not say where there are none.
+    pub(super) fn replayed(&mut self, row: &Row) {
+        for (motor, temperature_c) in self.motors.iter_mut().zip(row.motor_temperature_c) {
+            motor.status.temperature_c = temperature_c.or(motor.status.temperature_c);
+        }
     }
 
     /// A row of the recording.
@@ -150,5 +166,30 @@ impl Tally {
             age: self.imu.heard.map(|heard| now.saturating_sub(heard)),
             ..self.imu.status
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tick_is_late_from_a_period_on_however_many_it_covers() {
+        let mut tally = Tally::new(None);
+        for (late_us, skipped) in [(0, 0), (999, 0), (1000, 1), (50_500, 50), (10, 0)] {
+            let (due, late) = (Duration::from_millis(1), Duration::from_micros(late_us));
+            tally.tick(&Tick { due, late, skipped });
+        }
+        assert_eq!(tally.counters(Duration::ZERO, 0).late, 2);
+    }
+
+    #[test]
+    fn losses_of_all_stages_are_told_apart() {
+        let mut tally = Tally::new(None);
+        tally.lost(3);
+        tally.bus(7, 1, 2);
+        tally.bus(9, 1, 2);
+        let Counters { dropped, lost, errors, reconnects, .. } = tally.counters(Duration::ZERO, 4);
+        assert_eq!([dropped, lost, errors, reconnects], [9, 7, 1, 2]);
     }
 }

@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use crate::control::BalanceController;
 use crate::control::drive::{Check, DriveOrder, Excitation, Stage};
+use crate::link::dbc::Choice;
 use crate::link::{MotorHealth, StampedFrame};
 use crate::model_file::RobotModel;
 use crate::record::Sample;
@@ -158,6 +159,15 @@ impl SessionMode {
     }
 }
 
+/// A robot whose frames a DBC file describes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Described {
+    /// The DBC file.
+    pub file: PathBuf,
+    /// Which of its signals are what.
+    pub signals: Vec<Choice>,
+}
+
 /// What a session is opened with.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SessionOptions {
@@ -165,6 +175,8 @@ pub struct SessionOptions {
     pub source: Source,
     /// IMU on a serial port of its own; an emulated or replayed robot has its IMU with it.
     pub imu: Option<SerialAddress>,
+    /// Another robot than one with LK motors and a JY901; it can be watched only.
+    pub dbc: Option<Described>,
     /// The robot.
     pub robot: RobotModel,
     /// Whether anything may be sent.
@@ -237,6 +249,24 @@ pub enum EventKind {
     Warning,
     /// The robot was stopped.
     Stop,
+}
+
+impl EventKind {
+    const ALL: [Self; 3] = [Self::Note, Self::Warning, Self::Stop];
+
+    /// Its name in recordings and lines.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Note => "note",
+            Self::Warning => "warning",
+            Self::Stop => "stop",
+        }
+    }
+
+    /// The sort of this name.
+    pub(super) fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.name() == name)
+    }
 }
 
 /// How everything stands.
@@ -335,11 +365,11 @@ pub struct Counters {
     pub bus_load: Option<f64>,
     /// Frames that the system or the adapter dropped before they were read.
     pub dropped: u64,
-    /// Frames that came but did not reach a window or a recording.
+    /// Frames and samples that came but did not reach the control loop, a window or a recording.
     pub lost: u64,
-    /// Error frames and damaged lines.
+    /// Error frames, damaged lines of an adapter, and those of a recording that is replayed.
     pub errors: u64,
-    /// Readings that came after the tick they were for.
+    /// Ticks of the control loop that came a period late or later.
     pub late: u64,
     /// Times the bus was lost and came back.
     pub reconnects: u64,

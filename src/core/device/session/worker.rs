@@ -9,12 +9,12 @@ use super::hearing::Hearing;
 use super::link::{Heard, Link};
 use super::publisher::Publisher;
 use super::tally::Tally;
-use super::types::{Connection, DriveStatus, Event, EventKind, SessionOrder, Status};
+use super::types::{Connection, DriveStatus, Event, EventKind, SessionOrder, Status, Timing};
 use crate::control::drive::{Drive, DriveEvent, DriveOrder, Inputs, Listener, Output, Stage};
 use crate::device::{Pacer, Recorder, RecorderInput};
 use crate::link::{Direction, MotorOrder, StampedFrame};
 use crate::record::Sample;
-use crate::record::recording::About;
+use crate::record::recording::{About, Row};
 
 /// Period of the control loop.
 pub(super) const TICK: Duration = Duration::from_millis(1);
@@ -63,7 +63,12 @@ impl Recording {
         Ok(())
     }
 
-    fn end(&mut self) -> Option<String> {
+    /// Whether rows and frames would soon be lost.
+    pub(super) fn is_behind(&self) -> bool {
+        self.input.as_ref().is_some_and(|input| !input.has_room())
+    }
+
+    pub(super) fn end(&mut self) -> Option<String> {
         self.input = None;
         let status = self.recorder.take()?.finish();
         Some(status.problem.unwrap_or_else(|| {
@@ -86,6 +91,7 @@ impl Worker {
                 break;
             }
             let now = tick.due + tick.late;
+            self.tally.tick(&tick);
             self.tick(now, tick.late);
             if self.publisher.is_due(tick.due) {
                 self.publish(now);
@@ -95,7 +101,7 @@ impl Worker {
         self.recording.end();
     }
 
-    fn take_orders(&mut self, now: Duration) -> ControlFlow<()> {
+    pub(super) fn take_orders(&mut self, now: Duration) -> ControlFlow<()> {
         loop {
             match self.orders.try_recv() {
                 Ok(SessionOrder::Drive(order)) => self.drive_orders.push(order),
@@ -159,7 +165,7 @@ impl Worker {
     }
 
     /// Ends the slice that is over at `time`, and begins one where there is none.
-    fn slice(&mut self, end: &mut Option<Duration>, time: Duration) {
+    pub(super) fn slice(&mut self, end: &mut Option<Duration>, time: Duration) {
         if let Some(over) = end.take_if(|end| *end <= time) {
             self.sample(over);
         }
@@ -167,7 +173,7 @@ impl Worker {
     }
 
     /// The sample of what has been heard by `now`.
-    fn sample(&mut self, now: Duration) {
+    pub(super) fn sample(&mut self, now: Duration) {
         let Role::Listen(listener) = &mut self.role else { return };
         let sample = listener.hear(now, &self.hearing.motors, &self.hearing.imu);
         self.hearing.clear();
@@ -176,20 +182,25 @@ impl Worker {
         }
     }
 
-    fn hear_frame(&mut self, frame: &StampedFrame) {
+    pub(super) fn hear_frame(&mut self, frame: &StampedFrame) {
         self.hearing.frame(frame, &mut self.tally, self.recording.input.as_ref());
         self.publisher.frame(*frame);
     }
 
-    fn hear_imu(&mut self, time: Duration, bytes: &[u8]) {
+    pub(super) fn hear_imu(&mut self, time: Duration, bytes: &[u8]) {
         self.hearing.imu_bytes(time, bytes, &mut self.tally, self.recording.input.as_ref());
     }
 
     fn keep(&mut self, sample: Sample) {
+        let row = self.tally.row(&sample);
+        self.keep_row(&row);
+    }
+
+    pub(super) fn keep_row(&mut self, row: &Row) {
         if let Some(recorder) = &self.recording.input {
-            recorder.row(&self.tally.row(&sample));
+            recorder.row(row);
         }
-        self.publisher.samples.push(sample);
+        self.publisher.samples.push(row.sample);
     }
 
     fn drive(&mut self, now: Duration, late: Duration) {
@@ -250,7 +261,7 @@ impl Worker {
         }
     }
 
-    fn note(&mut self, time: Duration, kind: EventKind, text: String) {
+    pub(super) fn note(&mut self, time: Duration, kind: EventKind, text: String) {
         let event = Event { time, kind, text };
         if let Some(recorder) = &self.recording.input {
             recorder.event(&event);
@@ -259,9 +270,16 @@ impl Worker {
     }
 
     fn publish(&mut self, now: Duration) {
+        let status = self.status(now);
+        let lost = self.publisher.publish(status);
+        self.tally.lost(lost);
+    }
+
+    /// How everything stands.
+    pub(super) fn status(&mut self, now: Duration) -> Status {
         let [dropped, errors, reconnects] = self.link.losses();
         self.tally.bus(dropped, errors, reconnects);
-        let status = Status {
+        Status {
             time: now,
             connection: self.connection(now),
             drive: match &self.role {
@@ -273,14 +291,20 @@ impl Worker {
             motors: self.tally.motor_status(now),
             imu: self.tally.imu_status(now),
             counters: self.tally.counters(now, self.recording.recorder.as_ref().map_or(0, Recorder::lost)),
-            timing: self.pacer.timing(),
+            timing: self.timing(),
             recording: self.recording.recorder.as_ref().map(Recorder::status),
-        };
-        let lost = self.publisher.publish(status);
-        self.tally.lost(lost);
+        }
+    }
+
+    /// Of the control loop, which a recording has not.
+    fn timing(&self) -> Timing {
+        if matches!(self.link, Link::Replay(_)) { Timing::default() } else { self.pacer.timing() }
     }
 
     fn connection(&self, now: Duration) -> Connection {
+        if let Link::Replay(player) = &self.link {
+            return player.connection();
+        }
         if let Some(reason) = self.link.problem() {
             return Connection::Lost { reason };
         }
@@ -294,7 +318,8 @@ impl Worker {
         }
         match self.hearing.ids() {
             Some(ids) => format!(
-                "frames of {ids} are heard, but none of the robot's motors: check left_motor_id and right_motor_id in [link]"
+                "frames of {ids} are heard, but {}",
+                self.hearing.wanted()
             ),
             None => "nothing is heard: motors answer only when they are asked, by the robot's own controller or while \
                      checking; check supply, wiring, termination and bit rate"

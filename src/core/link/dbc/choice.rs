@@ -43,6 +43,15 @@ impl Quantity {
         Self::NAMES.iter().find(|(known, _)| *known == self).map_or("", |(_, name)| name)
     }
 
+    /// The quantity of this name, with or without its unit: `pitch` is `pitch_rad`.
+    fn named(name: &str) -> Option<Self> {
+        let without_unit = |known: &'static str| {
+            ["_rad_s", "_rad", "_nm", "_c"].iter().find_map(|unit| known.strip_suffix(unit))
+        };
+        let mut names = Self::NAMES.iter();
+        names.find(|(_, known)| *known == name || without_unit(known) == Some(name)).map(|(known, _)| *known)
+    }
+
     /// What a unit of a DBC file is worth in the unit of this quantity; none of a unit that does not fit or is
     /// not known.
     pub fn factor_from_unit(self, unit: &str) -> Option<f64> {
@@ -79,7 +88,7 @@ impl fmt::Display for Quantity {
 }
 
 /// A quantity and the signal that has it, as text `QUANTITY=SIGNAL`, `QUANTITY=MESSAGE.SIGNAL`, or one of these
-/// with `*FACTOR`.
+/// with `*FACTOR`; the unit of the quantity may be left out, as in `pitch=SIGNAL`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Choice {
     /// What it is.
@@ -120,8 +129,8 @@ impl FromStr for Choice {
         let form = || ChoiceSyntaxError::Form { text: text.to_owned() };
         let (name, source) = text.split_once('=').ok_or_else(form)?;
         let name = name.trim();
-        let quantity = Quantity::NAMES.iter().find(|(_, known)| *known == name);
-        let (quantity, _) = quantity.ok_or_else(|| ChoiceSyntaxError::Quantity { name: name.to_owned() })?;
+        let quantity =
+            Quantity::named(name).ok_or_else(|| ChoiceSyntaxError::Quantity { name: name.to_owned() })?;
         let (signal, factor) = match source.split_once('*') {
             None => (source, None),
             Some((signal, factor)) => {
@@ -136,6 +145,6 @@ impl FromStr for Choice {
         if signal.is_empty() || message.as_deref() == Some("") {
             return Err(form());
         }
-        Ok(Self { quantity: *quantity, message, signal: signal.to_owned(), factor })
+        Ok(Self { quantity, message, signal: signal.to_owned(), factor })
     }
 }

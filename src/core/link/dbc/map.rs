@@ -112,6 +112,21 @@ impl SignalMap {
         Ok(Self { sources, torque_constant_nm_a, pitch, motors })
     }
 
+    /// Whether pitch or its rate is chosen.
+    pub fn has_pitch(&self) -> bool {
+        self.pitch.has.contains(&true)
+    }
+
+    /// Whether a motor's torque is chosen.
+    pub fn has_torque(&self, motor: Motor) -> bool {
+        self.sources.iter().any(|source| source.quantity == Quantity::Torque(motor))
+    }
+
+    /// A motor of which neither angle nor speed is chosen.
+    pub fn missing_motor(&self) -> Option<Motor> {
+        Motor::BOTH.into_iter().find(|motor| !self.motors[*motor as usize].motion.has.contains(&true))
+    }
+
     /// What a frame tells; at most one reading of each motor and of the pitch.
     pub fn receive(&mut self, stamped: &StampedFrame) -> impl Iterator<Item = Heard> + use<> {
         let StampedFrame { time, frame, .. } = *stamped;

@@ -221,6 +221,19 @@ fn chosen_signals_become_readings() {
 }
 
 #[test]
+fn motors_of_which_nothing_moves_are_named() {
+    let missing = |texts: &[&str]| SignalMap::new(&dbc(), &choices(texts), 1.0).unwrap().missing_motor();
+    assert_eq!(missing(&["pitch=Imu.Pitch", "torque_left=LeftTorque"]), Some(Motor::Left));
+    assert_eq!(missing(&["motor_speed_left=LeftSpeed"]), Some(Motor::Right));
+    let both = ["motor_speed_left=LeftSpeed", "motor_angle_right=Floats.Single"];
+    assert_eq!(missing(&both), None);
+    let has_pitch = |texts: &[&str]| SignalMap::new(&dbc(), &choices(texts), 1.0).unwrap().has_pitch();
+    let torque = SignalMap::new(&dbc(), &choices(&["torque_left=LeftTorque"]), 1.0).unwrap();
+    assert_eq!(Motor::BOTH.map(|motor| torque.has_torque(motor)), [true, false]);
+    assert!(!has_pitch(&both) && has_pitch(&["pitch_rate=Rate"]));
+}
+
+#[test]
 fn wrong_choices_are_named() {
     let refused = |text: &str| SignalMap::new(&dbc(), &choices(&[text]), 1.0).unwrap_err().to_string();
     for (text, message) in [
@@ -241,8 +254,28 @@ fn wrong_choices_are_named() {
     {
         assert!(matches!(text.parse::<Choice>(), Err(ChoiceSyntaxError::Form { .. })), "{text}");
     }
-    let unknown = "pitch=Imu.Pitch".parse::<Choice>().unwrap_err().to_string();
-    assert!(unknown.starts_with("there is no quantity `pitch`: there are pitch_rad, "), "{unknown}");
+    for unknown in ["lean", "pitch_", "motor_speed", "rad", ""] {
+        let message = format!("{unknown}=Imu.Pitch").parse::<Choice>().unwrap_err().to_string();
+        let expected = format!("there is no quantity `{unknown}`: there are pitch_rad, ");
+        assert!(message.starts_with(&expected), "{message}");
+    }
+}
+
+#[test]
+fn quantities_may_be_named_without_their_unit() {
+    for (quantity, name) in Quantity::NAMES {
+        assert_eq!(choices(&[&format!("{name}=x")])[0].quantity, quantity);
+    }
+    for (short, name) in [
+        ("pitch", "pitch_rad"),
+        ("pitch_rate", "pitch_rate_rad_s"),
+        ("motor_angle_left", "motor_angle_left_rad"),
+        ("motor_speed_right", "motor_speed_right_rad_s"),
+        ("torque_left", "torque_left_nm"),
+        ("motor_temperature_right", "motor_temperature_right_c"),
+    ] {
+        assert_eq!(choices(&[&format!("{short}=x")]), choices(&[&format!("{name}=x")]), "{short}");
+    }
 }
 
 #[test]

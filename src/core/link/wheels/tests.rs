@@ -327,3 +327,42 @@ fn other_frames_tell_nothing() {
         assert_eq!(wheels.receive(&frame).count(), 0);
     }
 }
+
+/// The reply to each of two commands in one millisecond is told, whichever comes first.
+#[test]
+fn commands_of_two_kinds_are_answered_apart() {
+    let settings = LinkSettings { torque_constant_nm_a: Some(0.32), ..LinkSettings::default() };
+    for first in [MotorOrder::On, MotorOrder::Off] {
+        let mut wheels = Wheels::new(&settings);
+        let orders = [first, MotorOrder::Torque([0.0; 2])];
+        let frames: Vec<Frame> = orders.iter().flat_map(|order| wheels.frames(order)).collect();
+        for frame in &frames {
+            let sent = StampedFrame { time: Duration::ZERO, direction: Direction::Sent, frame: *frame };
+            assert_eq!(wheels.receive(&sent).count(), 0);
+        }
+        let echo: [u8; 8] = frames[0].bytes().try_into().unwrap();
+        let events: Vec<_> = wheels.receive(&received(0.25, 0x141, echo)).collect();
+        let [MotorEvent::Acknowledged { motor: Motor::Left, command, .. }] = events[..] else {
+            panic!("{events:?}")
+        };
+        assert_eq!(command, echo[0]);
+    }
+}
+
+#[test]
+fn of_a_recording_torques_that_were_sent_are_told_too() {
+    let sent = stamped(1.0, Direction::Sent, 0x141, torque(200));
+    let together = stamped(2.0, Direction::Sent, 0x280, [100, 0, 100, 0, 0, 0, 0, 0]);
+    let asked = |wheels: &mut Wheels, frame: &StampedFrame| wheels.receive(frame).count();
+    let mut live = Wheels::new(&sixteen_turns());
+    let mut replayed = Wheels::new(&sixteen_turns()).telling_sent();
+    assert_eq!([asked(&mut live, &sent), asked(&mut live, &together)], [0, 0]);
+    let [event] = replayed.receive(&sent).collect::<Vec<_>>()[..] else { panic!("one event") };
+    let MotorEvent::Asked { motor: Motor::Left, current_a, .. } = event else { panic!("{event:?}") };
+    assert!((current_a - 200.0 * 33.0 / 4096.0).abs() < 1e-12, "{current_a} A");
+    assert_eq!(asked(&mut replayed, &together), 2);
+    // What follows is its reply, and no command of somebody else.
+    let reply = reply(0xA1, state(30, 200, 10, 77));
+    let told: Vec<_> = replayed.receive(&received(2.2, 0x141, reply)).collect();
+    assert!(matches!(told[..], [MotorEvent::State(Motor::Left, _)]), "{told:?}");
+}

@@ -1,5 +1,6 @@
 //! Reading raw frames of any length, one by one.
 
+use std::borrow::Cow;
 use std::fmt::Display;
 use std::io::{BufRead, Read};
 
@@ -14,7 +15,7 @@ const LINE_LIMIT_BYTES: usize = 1 << 10;
 /// line without an end: it was cut.
 pub struct FrameLog<'a, R> {
     reader: R,
-    source: &'a str,
+    source: Cow<'a, str>,
     line: Vec<u8>,
     interface: String,
     number: u64,
@@ -26,10 +27,10 @@ pub struct FrameLog<'a, R> {
 
 impl<'a, R: BufRead> FrameLog<'a, R> {
     /// A reader of this text; `source` is its name in messages.
-    pub fn new(reader: R, source: &'a str) -> Self {
+    pub fn new(reader: R, source: impl Into<Cow<'a, str>>) -> Self {
         Self {
             reader,
-            source,
+            source: source.into(),
             line: Vec::new(),
             interface: String::new(),
             number: 0,
@@ -100,7 +101,7 @@ impl<'a, R: BufRead> FrameLog<'a, R> {
     fn read_piece(&mut self) -> Result<usize, LogError> {
         let piece = self.reader.by_ref().take(LINE_LIMIT_BYTES as u64).read_until(b'\n', &mut self.line);
         piece.map_err(|error| LogError::Io {
-            file: self.source.to_owned(),
+            file: self.source.to_string(),
             line: self.number,
             problem: error.to_string(),
         })
@@ -116,7 +117,7 @@ impl<'a, R: BufRead> FrameLog<'a, R> {
     fn end(&self) -> Result<(), LogError> {
         match &self.first_problem {
             Some(first) if self.frames == 0 => Err(LogError::MostlyBad {
-                file: self.source.to_owned(),
+                file: self.source.to_string(),
                 bad: self.damaged as usize,
                 rows: self.damaged as usize,
                 first: first.clone(),
