@@ -195,6 +195,28 @@ fn every_kind_survives_the_round_trip_through_a_model_file() {
 }
 
 #[test]
+fn the_readme_lists_every_kind_with_its_parameters() {
+    let readme = include_str!("../../../../README.md");
+    for kind in KINDS {
+        let start = format!("| `{}` | {} | ", kind.id, kind.summary.replace('|', "\\|"));
+        let row = readme.lines().find_map(|line| line.strip_prefix(&*start));
+        let row = row.unwrap_or_else(|| panic!("README has no row {start}"));
+        for (parameter, &on) in
+            kind.parameters.iter().flat_map(|p| kind.machines.iter().map(move |on| (p, on)))
+        {
+            let key = format!("`{}`", parameter.key(on).replace('#', "1"));
+            assert!(row.contains(&key), "{}: {key} is not in {row}", kind.id);
+        }
+        let fed = match kind.feedforward {
+            Feedforward::Causal => "| yes |",
+            Feedforward::Declared => "| in the number |",
+            Feedforward::Never(_) => "| no |",
+        };
+        assert!(row.ends_with(fed), "{}: {row}", kind.id);
+    }
+}
+
+#[test]
 fn values_that_no_machine_has_are_refused_with_the_mend() {
     let robot = MachineKind::Robot;
     let cogging = [("order_1", 14.0), ("cos_1_nm", 0.01), ("sin_1_nm", 0.0)];
