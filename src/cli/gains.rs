@@ -154,7 +154,7 @@ fn unstable(robot: &RobotModel, place: &str) -> String {
 
 /// What the margins are for, in words.
 fn timing(robot: &RobotModel) -> String {
-    let (delay_s, imu) = (robot.actuation.delay_s, robot.sensors);
+    let (delay_s, imu) = (robot.torque_delay_s(), robot.with_effects_declared().sensors);
     let latency = match imu.imu_latency_s {
         0.0 => String::new(),
         age_s => format!(", {} ms old", short(1e3 * age_s)),

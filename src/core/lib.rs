@@ -6,6 +6,7 @@
 //! | [`robot`] | the wheel-legged robot's parameters and dynamics |
 //! | [`lqr`] | Riccati equation and LQR design |
 //! | [`friction`] | Stribeck curve and its feedforward |
+//! | [`effects`] | what a declared model may lack |
 //! | [`control`] | one pure step from measurements to motor torques |
 //! | [`link`] | protocols of motors, IMU and adapters, without input or output |
 //! | [`device`] | sockets, ports, threads and clocks |
@@ -26,6 +27,7 @@
 
 pub mod control;
 pub mod device;
+pub mod effects;
 pub mod export;
 pub mod friction;
 pub mod identify;

@@ -349,14 +349,14 @@ impl App {
 
     fn send_robot(&mut self) {
         if let Some((robot, controller)) = self.robot_and_controller() {
-            self.link.set_controller(controller);
+            self.link.set_controller(controller.clone());
             self.live.send(LiveCommand::Robot(Box::new(robot), controller));
         }
     }
 
     fn send_controller(&mut self) {
         if let Some((_, controller)) = self.robot_and_controller() {
-            self.link.set_controller(controller);
+            self.link.set_controller(controller.clone());
             self.live.send(LiveCommand::Controller(controller));
         }
     }

@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 use flqr_core::control::{BalanceController, ControllerKind};
 use flqr_core::friction::{Compensation, Stribeck};
 use flqr_core::lqr::Weights;
-use flqr_core::model_file::{AxisModel, Model, Rig, RobotModel, presets};
+use flqr_core::model_file::{AxisParameters, Model, Rig, RobotModel, presets};
 use nalgebra::Matrix2x4;
 
 /// Weights and compensation of a robot whose file has none: those of the paper's preset, without the entry
@@ -93,7 +93,9 @@ impl Session {
     pub(crate) fn friction(&self, motor: usize) -> Option<Stribeck> {
         match &self.rig {
             Rig::Robot(robot) => robot.friction[motor],
-            Rig::Axis(AxisModel::Rotary { friction, .. } | AxisModel::Linear { friction, .. }) => *friction,
+            Rig::Axis(axis) => match axis.parameters {
+                AxisParameters::Rotary { friction, .. } | AxisParameters::Linear { friction, .. } => friction,
+            },
         }
     }
 

@@ -1,13 +1,16 @@
 //! LQR and FLQR (Eqs. 13, 29).
 
+use std::sync::Arc;
+
 use nalgebra::{Matrix2x4, Vector2};
 
 use super::odometry::{Measurement, Odometry};
 use super::yaw::default_yaw_hold;
 use crate::ParameterError;
+use crate::effects::{EffectFeedforward, Machine, Moment};
 use crate::friction::{Compensation, Feedforward};
 use crate::model_file::RobotModel;
-use crate::robot::{State, YawHold};
+use crate::robot::{Motor, State, YawHold};
 
 /// Compensation of models that give friction but no `[compensation]`: a little less than the whole curve,
 /// so that a curve that was identified 10 % too high does not drive the robot by itself, and a direction
@@ -19,7 +22,7 @@ pub const DEFAULT_COMPENSATION: Compensation = Compensation { ratio: 0.9, smooth
 pub enum ControllerKind {
     /// u = −K X.
     Lqr,
-    /// u = −K X + τ_f(q̇), friction fed forward per motor.
+    /// u = −K X + τ_f(q̇), friction and known effects inside the motors fed forward per motor.
     Flqr,
 }
 
@@ -33,13 +36,15 @@ pub struct Reference {
 }
 
 /// State feedback with yaw hold, optional friction feedforward and a torque limit.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct BalanceController {
     /// K, 2×4: rows left and right motor, columns N m/m, N m s/m, N m/rad, N m s/rad.
     pub gain: Matrix2x4<f64>,
     /// Friction feedforward of the left and the right motor; none in plain LQR and where a motor has no
     /// known friction.
     pub feedforward: [Option<Feedforward>; 2],
+    /// Feedforward of the model's effects inside the motors; none in plain LQR and of models without any.
+    pub effects: Option<Arc<EffectFeedforward>>,
     /// Largest torque of one motor, N m; infinite if unlimited.
     pub torque_limit_nm: f64,
     /// What keeps the heading.
@@ -76,13 +81,15 @@ impl BalanceController {
     /// [`DEFAULT_COMPENSATION`]), yaw hold (or [`default_yaw_hold`]) and torque limit come from the model.
     pub fn new(kind: ControllerKind, robot: &RobotModel, gain: Matrix2x4<f64>) -> Result<Self, ControlError> {
         check_gain(&gain)?;
-        let feedforward = match kind {
-            ControllerKind::Lqr => [None; 2],
+        let robot = &robot.with_effects_declared();
+        let (feedforward, effects) = match kind {
+            ControllerKind::Lqr => ([None; 2], None),
             ControllerKind::Flqr => feedforward(robot)?,
         };
         Ok(Self {
             gain,
             feedforward,
+            effects,
             torque_limit_nm: robot.limits.torque_nm.unwrap_or(f64::INFINITY),
             yaw_hold: robot.yaw_hold.unwrap_or_else(|| default_yaw_hold(&robot.parameters, &robot.chassis)),
             odometry: Odometry::new(robot),
@@ -90,8 +97,8 @@ impl BalanceController {
     }
 
     /// Torques of the left and the right motor, N m: K (X̃ − X) (Eq. 26) plus the yaw hold, in equal and
-    /// opposite shares, plus the feedforward at each motor's speed (Eq. 29), within the limit; 0 where a
-    /// measurement is not a number, so that a sensor that failed cannot drive the robot.
+    /// opposite shares, plus the feedforward at each motor's speed (Eq. 29) and what makes up for the effects inside
+    /// the motor, within the limit; 0 where a measurement is not a number, so that a sensor that failed cannot drive the robot.
     ///
     /// The yaw hold follows the difference of the wheels alone, so that it is the same at any speed, and the
     /// balance their mean alone, so that neither disturbs the other.
@@ -106,8 +113,35 @@ impl BalanceController {
             let friction = self.feedforward[motor]
                 .map_or(0.0, |feedforward| feedforward.torque_nm(measurement.motor_speed_rad_s[motor]));
             let torque = feedback[motor] + [-turning, turning][motor] + friction;
+            let torque = self.with_effects(motor, measurement, torque);
             if torque.is_finite() { torque.clamp(-limit, limit) } else { 0.0 }
         })
+    }
+}
+
+impl BalanceController {
+    /// Whether it feeds effects forward that depend on the rotors' own angles.
+    pub fn needs_rotor_angle(&self) -> bool {
+        let effects = self.effects.iter().flat_map(|effects| effects.effects());
+        effects.into_iter().any(|effect| effect.kind().by_angle())
+    }
+
+    /// The same without the effects that depend on the rotor's own angle, for motors whose angles count from
+    /// elsewhere.
+    pub fn without_rotor_angle(self) -> Self {
+        let effects = self.effects.as_ref().and_then(|effects| effects.without_rotor_angle());
+        Self { effects: effects.map(Arc::new), ..self }
+    }
+
+    /// What has to be asked of a motor for a torque, N m.
+    fn with_effects(&self, motor: usize, measurement: &Measurement, torque_nm: f64) -> f64 {
+        let Some(effects) = &self.effects else { return torque_nm };
+        let moment = Moment {
+            motor_angle_rad: measurement.motor_angle_rad[motor],
+            motor_speed_rad_s: measurement.motor_speed_rad_s[motor],
+            ..Moment::default()
+        };
+        effects.asked_nm(Motor::BOTH[motor], &moment, torque_nm)
     }
 }
 
@@ -123,14 +157,19 @@ fn check_gain(gain: &Matrix2x4<f64>) -> Result<(), ControlError> {
     Ok(())
 }
 
-fn feedforward(robot: &RobotModel) -> Result<[Option<Feedforward>; 2], ControlError> {
-    if robot.friction.iter().all(Option::is_none) {
+/// What is fed forward of both motors' friction, and of the effects inside them.
+type Fed = ([Option<Feedforward>; 2], Option<Arc<EffectFeedforward>>);
+
+fn feedforward(robot: &RobotModel) -> Result<Fed, ControlError> {
+    let compensation = robot.compensation.unwrap_or(DEFAULT_COMPENSATION);
+    compensation.validate()?;
+    let effects = EffectFeedforward::new(&Machine::robot(robot), &robot.effects, compensation);
+    if robot.friction.iter().all(Option::is_none) && effects.is_none() {
         return Err(ControlError::NoFriction);
     }
-    let compensation = robot.compensation.unwrap_or(DEFAULT_COMPENSATION);
     let mut motors = [None; 2];
     for (motor, curve) in motors.iter_mut().zip(robot.friction) {
         *motor = curve.map(|curve| Feedforward::new(curve, compensation)).transpose()?;
     }
-    Ok(motors)
+    Ok((motors, effects.map(Arc::new)))
 }

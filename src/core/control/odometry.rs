@@ -21,6 +21,8 @@ pub struct Readings {
 pub struct Measurement {
     /// X as the robot estimates it from encoders and IMU.
     pub state: State,
+    /// Motor angles q, left and right, rad.
+    pub motor_angle_rad: [f64; 2],
     /// Motor speeds q̇, left and right, rad/s.
     pub motor_speed_rad_s: [f64; 2],
     /// Heading ψ since the start, left positive, rad.
@@ -59,6 +61,7 @@ impl Odometry {
         };
         Measurement {
             state,
+            motor_angle_rad,
             motor_speed_rad_s,
             yaw_rad: turned(motor_angle_rad),
             yaw_rate_rad_s: turned(motor_speed_rad_s),

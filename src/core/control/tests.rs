@@ -73,7 +73,7 @@ fn torque_stays_within_the_limit_of_the_model() {
     fallen.state.pitch_rad = -1.0;
     assert_eq!(controller.step(&fallen, &HERE), [-0.05, -0.05]);
     for broken in [-1.0, f64::NAN] {
-        let off = BalanceController { torque_limit_nm: broken, ..controller };
+        let off = BalanceController { torque_limit_nm: broken, ..controller.clone() };
         assert_eq!(off.step(&fallen, &HERE).map(f64::abs), [0.0, 0.0]);
     }
 }
@@ -114,7 +114,13 @@ fn odometry_takes_the_way_from_the_mean_and_the_heading_from_the_difference() {
     let state = State { x_m: 0.625, x_dot_m_s: -0.5, pitch_rad: 0.5, pitch_rate_rad_s: -1.0 };
     assert_eq!(
         found,
-        Measurement { state, motor_speed_rad_s: [-4.0, 2.0], yaw_rad: 1.0, yaw_rate_rad_s: 3.0 }
+        Measurement {
+            state,
+            motor_angle_rad: [1.0, 3.0],
+            motor_speed_rad_s: [-4.0, 2.0],
+            yaw_rad: 1.0,
+            yaw_rate_rad_s: 3.0,
+        }
     );
 }
 

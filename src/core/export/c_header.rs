@@ -2,6 +2,8 @@
 
 use std::fmt::Write;
 
+use crate::effects::Effect;
+
 use super::{Controller, FeedforwardNumbers, Motors, Scheduled};
 
 pub(super) fn render(controller: &Controller) -> String {
@@ -14,6 +16,10 @@ fn write_header(controller: &Controller, text: &mut String) -> std::fmt::Result 
     writeln!(text, "/* Balance controller of \"{}\", written by flqr.", comment_safe(&controller.name))?;
     writeln!(text, "   torque = gain * (reference - [x, x_dot, pitch, pitch_rate]) -/+ yaw hold")?;
     writeln!(text, "            + friction feedforward; SI units, rad. */")?;
+    if !controller.effects.is_empty() {
+        let ids: Vec<&str> = controller.effects.iter().map(Effect::id).collect();
+        writeln!(text, "/* Not fed forward here, although the model has it: {}. */", ids.join(", "))?;
+    }
     writeln!(text, "#ifndef FLQR_CONTROLLER_H\n#define FLQR_CONTROLLER_H\n\n#include <math.h>\n")?;
     writeln!(text, "/* Rows: left, right motor. N m/m, N m s/m, N m/rad, N m s/rad. */")?;
     writeln!(text, "typedef struct {{\n    double k[2][4];\n}} flqr_gains;\n")?;

@@ -7,6 +7,7 @@ use nalgebra::Matrix2x4;
 use serde::Serialize;
 
 use crate::control::{BalanceController, GainSchedule, ScheduleNode};
+use crate::effects::Effect;
 use crate::friction::{Compensation, Feedforward, StribeckParameters};
 use crate::robot::YawHold;
 
@@ -47,6 +48,10 @@ pub struct Controller {
     /// Friction feedforward; absent where no motor has one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub feedforward: Option<Motors<Option<FeedforwardNumbers>>>,
+    /// Effects inside the motors that the controller feeds forward, as in the model file; the C header names them and
+    /// leaves them out.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub effects: Vec<Effect>,
 }
 
 /// The gain at one height of the legs.
@@ -108,6 +113,7 @@ impl Controller {
             track_width_m: controller.odometry.track_width_m,
             torque_limit_nm: limit.is_finite().then_some(limit),
             feedforward: (left.is_some() || right.is_some()).then_some(Motors { left, right }),
+            effects: controller.effects.as_ref().map_or(Vec::new(), |effects| effects.effects().to_vec()),
         }
     }
 

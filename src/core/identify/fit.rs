@@ -8,7 +8,7 @@ use super::{
     Estimate, FitError, FitOptions, FitProgress, FitReport, FrictionPair, Motor, PairSet, StopReason,
     fit_pairs, pairs_from_log,
 };
-use crate::model_file::{AxisModel, Model, Rig};
+use crate::model_file::{AxisModel, AxisParameters, Model, Rig};
 use crate::record::{HealthFinding, Log, LogKind, Severity, data_health};
 
 /// From this many short dwells on a log looks like a staircase.
@@ -130,7 +130,7 @@ fn note_of(log: &Log, error: &FitError) -> Option<String> {
 fn kind(log: &Log, model: Option<&Model>) -> Result<LogKind, FitError> {
     let kind = log.kind()?;
     let wanted = match model.map(|model| &model.rig) {
-        Some(Rig::Axis(AxisModel::Linear { .. })) => LogKind::LinearAxis,
+        Some(Rig::Axis(AxisModel { parameters: AxisParameters::Linear { .. }, .. })) => LogKind::LinearAxis,
         Some(_) => LogKind::Bench,
         None => return Ok(kind),
     };

@@ -38,7 +38,7 @@ use std::ops::ControlFlow;
 use serde::Serialize;
 
 use crate::friction::StribeckParameters;
-use crate::model_file::AxisModel;
+use crate::model_file::{AxisModel, AxisParameters};
 use crate::record::{Log, LogError, LogKind};
 use problem::Problem;
 
@@ -131,11 +131,11 @@ pub struct KnownAxis {
 
 impl From<&AxisModel> for KnownAxis {
     fn from(model: &AxisModel) -> Self {
-        let (inertia, gravity_torque_nm, friction) = match *model {
-            AxisModel::Rotary { inertia_kg_m2, gravity_torque_nm, friction } => {
+        let (inertia, gravity_torque_nm, friction) = match model.parameters {
+            AxisParameters::Rotary { inertia_kg_m2, gravity_torque_nm, friction } => {
                 (inertia_kg_m2, gravity_torque_nm, friction)
             }
-            AxisModel::Linear { mass_kg, friction } => (mass_kg, 0.0, friction),
+            AxisParameters::Linear { mass_kg, friction } => (mass_kg, 0.0, friction),
         };
         Self { inertia, friction: friction.map(|curve| *curve.parameters()), gravity_torque_nm }
     }

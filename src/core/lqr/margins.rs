@@ -101,9 +101,10 @@ impl SampledLoop {
     /// The loop of a robot: control at 1 kHz, its model's delay, IMU and wheels. Motors that are read at a lower
     /// rate count with their readings' mean age as delay, which is an approximation.
     pub fn of(robot: &RobotModel) -> Self {
+        let robot = &robot.with_effects_declared();
         Self {
             tick_s: TICK_S,
-            delay_s: robot.actuation.delay_s + robot.sensors.mean_motor_age_s(),
+            delay_s: robot.torque_delay_s() + robot.sensors.mean_motor_age_s(),
             imu_period_s: f64::from(robot.sensors.imu_period_ticks()) * TICK_S,
             imu_latency_s: robot.sensors.imu_latency_s,
             wheel_radius_m: robot.parameters.wheel_radius_m,

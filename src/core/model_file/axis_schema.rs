@@ -2,8 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::effects_schema::EffectTable;
 use super::refusal::Refusal;
-use super::{AxisModel, Model, Rig};
+use super::{AxisModel, AxisParameters, Model, Rig, effects_schema};
+use crate::effects::MachineKind;
 use crate::friction::{Stribeck, StribeckParameters};
 use crate::parameter::{ParameterError, finite, positive};
 
@@ -13,6 +15,8 @@ pub(super) struct AxisFile {
     name: String,
     axis: AxisTable,
     friction: Option<AxisFrictionTable>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    effects: Vec<EffectTable>,
 }
 
 #[derive(Deserialize, Serialize)]
@@ -99,27 +103,29 @@ impl AxisFrictionTable {
 impl AxisFile {
     pub(super) fn into_model(self) -> Result<Model, Refusal> {
         let friction = self.friction.as_ref();
-        let axis = match self.axis {
+        let (parameters, machine) = match self.axis {
             AxisTable::Rotary { inertia_kg_m2, gravity_torque_nm } => {
                 positive("inertia_kg_m2", inertia_kg_m2).map_err(Refusal::parameter(&["axis"]))?;
                 finite("gravity_torque_nm", gravity_torque_nm).map_err(Refusal::parameter(&["axis"]))?;
                 let friction =
                     friction.map(|table| table.curve(table.rotary(), table.linear())).transpose()?;
-                AxisModel::Rotary { inertia_kg_m2, gravity_torque_nm, friction }
+                (AxisParameters::Rotary { inertia_kg_m2, gravity_torque_nm, friction }, MachineKind::Rotary)
             }
             AxisTable::Linear { mass_kg } => {
                 positive("mass_kg", mass_kg).map_err(Refusal::parameter(&["axis"]))?;
                 let friction =
                     friction.map(|table| table.curve(table.linear(), table.rotary())).transpose()?;
-                AxisModel::Linear { mass_kg, friction }
+                (AxisParameters::Linear { mass_kg, friction }, MachineKind::Linear)
             }
         };
+        let mut axis = AxisModel::new(parameters);
+        effects_schema::read_into_axis(self.effects, machine, &mut axis)?;
         Ok(Model { name: self.name, rig: Rig::Axis(axis) })
     }
 
     pub(super) fn from_model(name: &str, model: &AxisModel) -> Self {
-        let (axis, friction) = match *model {
-            AxisModel::Rotary { inertia_kg_m2, gravity_torque_nm, friction } => {
+        let (axis, friction) = match model.parameters {
+            AxisParameters::Rotary { inertia_kg_m2, gravity_torque_nm, friction } => {
                 let table = friction.map(|curve| {
                     let p = curve.parameters();
                     AxisFrictionTable {
@@ -134,7 +140,7 @@ impl AxisFile {
                 });
                 (AxisTable::Rotary { inertia_kg_m2, gravity_torque_nm }, table)
             }
-            AxisModel::Linear { mass_kg, friction } => {
+            AxisParameters::Linear { mass_kg, friction } => {
                 let table = friction.map(|curve| {
                     let p = curve.parameters();
                     AxisFrictionTable {
@@ -150,6 +156,6 @@ impl AxisFile {
                 (AxisTable::Linear { mass_kg }, table)
             }
         };
-        Self { name: name.to_owned(), axis, friction }
+        Self { name: name.to_owned(), axis, friction, effects: effects_schema::written(&model.effects) }
     }
 }

@@ -5,11 +5,15 @@
 //! is silently dropped would leave a default in its place.
 
 mod axis_schema;
+mod effects_schema;
 pub mod presets;
 mod refusal;
 mod robot_schema;
 
+use std::borrow::Cow;
+
 use crate::ParameterError;
+use crate::effects::Effect;
 use crate::friction::{Compensation, Stribeck};
 use crate::lqr::Weights;
 use crate::robot::{
@@ -68,6 +72,8 @@ pub struct RobotModel {
     pub link: LinkSettings,
     /// When the driven robot is stopped.
     pub safety: SafetyLimits,
+    /// What else has been found; none of those that are errors of the numbers above, which are put right there.
+    pub effects: Vec<Effect>,
 }
 
 impl RobotModel {
@@ -87,6 +93,7 @@ impl RobotModel {
             surroundings: Surroundings::default(),
             link: LinkSettings::default(),
             safety: SafetyLimits::default(),
+            effects: Vec::new(),
         }
     }
 
@@ -130,8 +137,24 @@ impl RobotModel {
 }
 
 /// A single axis on a bench.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AxisModel {
+    /// What moves, and its friction.
+    pub parameters: AxisParameters,
+    /// What else has been found; none of those that are errors of the numbers above, which are put right there.
+    pub effects: Vec<Effect>,
+}
+
+impl AxisModel {
+    /// An axis without further effects.
+    pub fn new(parameters: AxisParameters) -> Self {
+        Self { parameters, effects: Vec::new() }
+    }
+}
+
+/// What moves on a bench.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum AxisModel {
+pub enum AxisParameters {
     /// A motor shaft.
     Rotary {
         /// Inertia about the shaft, kg m².
@@ -242,14 +265,18 @@ fn line_around(text: &str, byte: usize) -> String {
     text.lines().nth(line - 1).unwrap_or_default().trim().chars().take(60).collect()
 }
 
-/// First byte of the deepest key of `path` that the document has; 0 where it has none.
-fn start_of(document: &toml::de::DeTable<'_>, path: &[&str]) -> usize {
+/// First byte of the deepest key of `path` that the document has; 0 where it has none. The key of a list is followed by
+/// a number from 0.
+fn start_of(document: &toml::de::DeTable<'_>, path: &[Cow<'static, str>]) -> usize {
     let mut table = document;
     let mut start = 0;
-    for key in path {
-        let Some((name, value)) = table.get_key_value(*key) else { break };
+    let mut path = path.iter();
+    while let Some(key) = path.next() {
+        let Some((name, value)) = table.get_key_value(&**key) else { break };
         start = name.span().start;
-        let Some(inner) = value.get_ref().as_table() else { break };
+        let value = value.get_ref();
+        let member = value.as_array().and_then(|array| array.get(path.next()?.parse::<usize>().ok()?));
+        let Some(inner) = member.map_or(value, |member| member.get_ref()).as_table() else { break };
         table = inner;
     }
     start
@@ -369,6 +396,110 @@ ground = [{}, { points_m = [[0.5, 0.0], [0.8, 0.03]] }]
         }
     }
 
+    const COGGING: &str = r#"
+[[effects]]
+id = "cogging"
+motor = "left"
+order_1 = 14
+cos_1_nm = 0.002
+sin_1_nm = -0.008
+order_2 = 7
+cos_2_nm = 0.001
+sin_2_nm = 0.0
+
+[[effects]]
+id = "tether_spring"
+stiffness_n_m = 12.0
+"#;
+    const RAIL_EFFECTS: &str = r#"
+[[effects]]
+id = "cogging"
+period_1_m = 0.01
+cos_1_n = 2.0
+sin_1_n = 0.5
+"#;
+
+    #[test]
+    fn effects_survive_the_round_trip_in_their_order() {
+        for (text, ids) in [
+            (format!("{ROBOT}{COGGING}"), vec!["cogging", "tether_spring"]),
+            (format!("{RAIL}{RAIL_EFFECTS}"), vec!["cogging"]),
+        ] {
+            let model = Model::from_toml(&text, "m.toml").unwrap();
+            let written = model.to_toml();
+            assert_eq!(Model::from_toml(&written, "again").unwrap(), model, "{written}");
+            let effects = match &model.rig {
+                Rig::Robot(robot) => &robot.effects,
+                Rig::Axis(axis) => &axis.effects,
+            };
+            assert_eq!(effects.iter().map(Effect::id).collect::<Vec<_>>(), ids);
+            assert!(written.contains("[[effects]]\nid = \"cogging\""), "{written}");
+        }
+        let model = Model::from_toml(&format!("{ROBOT}{COGGING}"), "m.toml").unwrap();
+        let [cogging, tether] = &model.robot().unwrap().effects[..] else { panic!("{model:?}") };
+        assert_eq!((cogging.get("order_2"), cogging.motor()), (Some(7.0), Some(crate::robot::Motor::Left)));
+        assert_eq!((tether.get("pull_n"), tether.motor()), (Some(0.0), None));
+        assert!(
+            model.to_toml().contains("order_1 = 14.0\ncos_1_nm = 0.002\nsin_1_nm = -0.008\norder_2 = 7.0")
+        );
+    }
+
+    #[test]
+    fn errors_of_declared_numbers_put_these_right() {
+        let added = |id: &str, key: &str, value: f64| {
+            let text = format!("{ROBOT}[[effects]]\nid = \"{id}\"\n{key} = {value}\n");
+            let model = Model::from_toml(&text, "m.toml").unwrap();
+            assert_eq!(model.robot().unwrap().effects, [], "{id}");
+            model.robot().unwrap().clone()
+        };
+        assert_eq!(added("mass_error", "mass_kg", 0.5).parameters.body_mass_kg, 13.5);
+        assert_eq!(added("com_height_error", "height_m", -0.05).parameters.com_height_m, 0.2);
+        assert_eq!(added("body_inertia_error", "inertia_kg_m2", 0.25).parameters.body_inertia_kg_m2, 0.5);
+        assert_eq!(added("inertia_error", "inertia_kg_m2", 0.005).parameters.wheel_inertia_kg_m2, 0.01);
+        let [left, right] = added("viscous_error", "viscous_nm_s_rad", 0.001).friction;
+        assert!((left.unwrap().parameters().viscous_nm_s_rad - 0.00149).abs() < 1e-15);
+        assert_eq!(right.unwrap().parameters().viscous_nm_s_rad, 0.001);
+        let rail = format!("{RAIL}[[effects]]\nid = \"inertia_error\"\nmass_kg = 5.0\n");
+        let Rig::Axis(axis) = Model::from_toml(&rail, "m.toml").unwrap().rig else { panic!("no axis") };
+        assert!(matches!(axis.parameters, AxisParameters::Linear { mass_kg: 100.0, .. }), "{axis:?}");
+    }
+
+    #[test]
+    fn each_mistake_in_an_effect_is_named_with_its_line() {
+        let lines = ROBOT.lines().count();
+        let robot = |old: &str, new: &str| format!("{ROBOT}{}", COGGING.replacen(old, new, 1));
+        for (text, line, part) in [
+            (robot("\"cogging\"", "\"coging\""), lines + 3, "there is no effect coging: use one of cogging,"),
+            (robot("\"cogging\"", "3"), lines + 3, "id = 3 is not a name"),
+            (robot("\"left\"", "\"middle\""), lines + 4, "use \"left\", \"right\" or \"both\""),
+            (robot("order_1 = 14", "order_1 = 14.5"), lines + 5, "must be a whole number"),
+            (robot("cos_1_nm", "cos_1"), lines + 6, "no parameter cos_1: use order_1, cos_1_nm, sin_1_nm"),
+            (robot("0.002", "\"much\""), lines + 6, "cos_1_nm = \"much\" is not a number"),
+            (robot("sin_2_nm = 0.0", ""), lines + 3, "cogging lacks sin_2_nm (sine part): add it"),
+            (robot("12.0", "nan"), lines + 14, "stiffness_n_m = NaN of tether_spring is out of range"),
+            (robot("12.0", "12.0\nmotor = \"left\""), lines + 15, "does not act on one motor"),
+            (format!("{ROBOT}[[effects]]\nstiffness_n_m = 1.0\n"), lines + 2, "an effect needs its id"),
+            (format!("{ROBOT}[[effects]]\n"), lines + 1, "an effect needs its id"),
+            (
+                format!("{ROBOT}[[effects]]\nid = \"mass_error\"\nmass_kg = -20.0\n"),
+                lines + 2,
+                "no machine can have",
+            ),
+            (format!("{RAIL}[[effects]]\nid = \"tether_spring\"\n"), 10, "cannot be on a linear axis"),
+            (
+                format!("{RAIL}{}", RAIL_EFFECTS.replace("period_1_m", "order_1")),
+                12,
+                "use period_1_m, cos_1_n",
+            ),
+        ] {
+            let error = Model::from_toml(&text, "m.toml").unwrap_err();
+            assert!(
+                error.line == line && error.problem.contains(part),
+                "{error} (expected line {line}, {part})"
+            );
+        }
+    }
+
     #[test]
     fn values_arrive_where_they_belong() {
         let model = Model::from_toml(ROBOT, "m.toml").unwrap();
@@ -377,9 +508,11 @@ ground = [{}, { points_m = [[0.5, 0.0], [0.8, 0.03]] }]
         assert_eq!(robot.friction[0].unwrap().parameters().static_nm, 0.0761);
         assert_eq!(robot.friction[1], None);
         assert_eq!(robot.weights.unwrap(), Weights::diagonal([60.0, 30.0, 100.0, 5.0], [20.0, 20.0]));
-        let Rig::Axis(AxisModel::Linear { mass_kg, friction }) = Model::from_toml(RAIL, "r").unwrap().rig
-        else {
-            panic!("a linear axis was read as something else");
+        let Rig::Axis(axis) = Model::from_toml(RAIL, "r").unwrap().rig else {
+            panic!("an axis was read as something else");
+        };
+        let AxisParameters::Linear { mass_kg, friction } = axis.parameters else {
+            panic!("a linear axis was read as a rotary one");
         };
         // Without the Stribeck keys the curve is plain Coulomb friction at every speed.
         assert_eq!((mass_kg, friction.unwrap().level_nm(0.01)), (95.0, 20.4));

@@ -3,8 +3,9 @@
 use nalgebra::{Matrix2, Matrix4};
 use serde::{Deserialize, Serialize};
 
+use super::effects_schema::EffectTable;
 use super::refusal::Refusal;
-use super::{Model, Rig, RobotModel};
+use super::{Model, Rig, RobotModel, effects_schema};
 use crate::friction::{Compensation, Stribeck, StribeckParameters};
 use crate::lqr::Weights;
 use crate::robot::{
@@ -36,6 +37,8 @@ pub(super) struct RobotFile {
     link: LinkSettings,
     #[serde(default, skip_serializing_if = "is_default")]
     safety: SafetyLimits,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    effects: Vec<EffectTable>,
 }
 
 fn is_default<T: Default + PartialEq>(value: &T) -> bool {
@@ -209,7 +212,7 @@ impl RobotFile {
         let curve = |parameters: Option<StribeckParameters>, table: &[&'static str]| {
             parameters.map(Stribeck::new).transpose().map_err(Refusal::parameter(table))
         };
-        let robot = RobotModel {
+        let mut robot = RobotModel {
             parameters,
             legs,
             chassis: self.chassis,
@@ -226,6 +229,7 @@ impl RobotFile {
             surroundings: self.surroundings,
             link: self.link,
             safety: self.safety,
+            effects: Vec::new(),
         };
         for (table, checked) in [
             ("chassis", robot.chassis.validate()),
@@ -240,6 +244,7 @@ impl RobotFile {
         ] {
             checked.map_err(Refusal::parameter(&[table]))?;
         }
+        effects_schema::read_into_robot(self.effects, &mut robot)?;
         Ok(Model { name: self.name, rig: Rig::Robot(Box::new(robot)) })
     }
 
@@ -259,6 +264,7 @@ impl RobotFile {
             surroundings: model.surroundings.clone(),
             link: model.link,
             safety: model.safety,
+            effects: effects_schema::written(&model.effects),
         }
     }
 }

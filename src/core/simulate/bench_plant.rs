@@ -6,6 +6,7 @@ use std::ops::RangeInclusive;
 
 use super::change::{MAX_CHANGES, first_below_zero};
 use super::planar::sliding::SlidingFriction;
+use crate::effects::{Action, EffectLaw, Law, Moment};
 use crate::friction::Stribeck;
 
 /// A shaft in motion.
@@ -18,6 +19,19 @@ pub struct BenchPlant {
     range_nm: Option<RangeInclusive<f64>>,
     shaft: Shaft,
     phase: Phase,
+    effects: Option<Box<Effects>>,
+    /// Level of dry friction that effects add to the curve's, and the least that they may, N m.
+    added_nm: f64,
+    least_nm: f64,
+}
+
+/// Laws with what they have to remember of the motion.
+#[derive(Clone, Debug)]
+struct Effects {
+    laws: Vec<EffectLaw>,
+    time_s: f64,
+    /// Speed before the last substep, rad/s; none before the first.
+    speed_before: Option<f64>,
 }
 
 /// Angle and speed; also their rates of change.
@@ -60,7 +74,26 @@ impl BenchPlant {
             range_nm,
             shaft: Shaft { angle: angle_rad, speed: speed_rad_s },
             phase,
+            effects: None,
+            added_nm: 0.0,
+            least_nm: -friction.map_or(0.0, |f| f.parameters().coulomb_nm.min(f.parameters().static_nm)),
         }
+    }
+
+    /// The same with effects on it.
+    pub fn with_effects(self, laws: Vec<EffectLaw>) -> Self {
+        if laws.is_empty() {
+            return self;
+        }
+        let offset = self.sliding.torque_nm(0.0, 0.0);
+        let range_nm = self.range_nm.clone().unwrap_or(offset..=offset);
+        let phase = match self.phase {
+            Phase::Free if self.shaft.speed == 0.0 => Phase::Stuck,
+            Phase::Free => Phase::Slide(self.shaft.speed.signum()),
+            phase => phase,
+        };
+        let effects = Some(Box::new(Effects { laws, time_s: 0.0, speed_before: None }));
+        Self { range_nm: Some(range_nm), phase, effects, ..self }
     }
 
     /// Angle, rad.
@@ -88,8 +121,18 @@ impl BenchPlant {
     pub fn advance(&mut self, torque_nm: f64, dt_s: f64, substeps: u32) {
         let step = dt_s / f64::from(substeps);
         for _ in 0..substeps {
-            self.substep(torque_nm, step);
+            let effects = self.act(torque_nm, step);
+            self.substep(torque_nm + effects, step);
         }
+    }
+
+    /// Torque of the effects over the next substep, N m, their dry friction apart.
+    fn act(&mut self, torque_nm: f64, step: f64) -> f64 {
+        let Some(effects) = &mut self.effects else { return 0.0 };
+        let Action { motor_nm, friction_nm, .. } =
+            effects.act(&self.shaft, self.phase == Phase::Stuck, torque_nm, step);
+        self.added_nm = if friction_nm < self.least_nm { self.least_nm } else { friction_nm };
+        motor_nm
     }
 
     fn substep(&mut self, torque_nm: f64, step: f64) {
@@ -120,6 +163,7 @@ impl BenchPlant {
     fn release(&mut self, torque_nm: f64) {
         let (Phase::Stuck, Some(range)) = (self.phase, &self.range_nm) else { return };
         let holding = torque_nm - self.load_nm(self.shaft.angle);
+        let range = (range.start() - self.added_nm)..=(range.end() + self.added_nm);
         if holding.is_nan() {
             // Nothing holds what is not a number; it shows in the speed.
             self.phase = Phase::Slide(1.0);
@@ -144,7 +188,7 @@ impl BenchPlant {
         let rate = |at: Shaft| {
             let direction =
                 if let Phase::Slide(direction) = self.phase { direction } else { at.speed.signum() };
-            let friction = self.sliding.torque_nm(at.speed, direction);
+            let friction = self.sliding.torque_nm(at.speed, direction) + direction * self.added_nm;
             Shaft {
                 angle: at.speed,
                 speed: (torque_nm - self.load_nm(at.angle) - friction) / self.inertia_kg_m2,
@@ -159,6 +203,28 @@ impl BenchPlant {
             speed: k1.speed + 2.0 * (k2.speed + k3.speed) + k4.speed,
         };
         moved(six_rates, dt / 6.0)
+    }
+}
+
+impl Effects {
+    /// What they do over the next substep: as of its middle, to which the motion is carried on with the acceleration
+    /// of the last one.
+    fn act(&mut self, shaft: &Shaft, held: bool, torque_nm: f64, step: f64) -> Action {
+        let before = self.speed_before.replace(shaft.speed).unwrap_or(shaft.speed);
+        let acceleration = if held { 0.0 } else { (shaft.speed - before) / step };
+        let half = 0.5 * step;
+        let moment = Moment {
+            time_s: self.time_s + half,
+            dt_s: step,
+            motor_angle_rad: shaft.angle + half * shaft.speed,
+            motor_speed_rad_s: shaft.speed + half * acceleration,
+            motor_accel_rad_s2: acceleration,
+            torque_nm,
+            torque_sum_nm: torque_nm,
+            ..Moment::default()
+        };
+        self.time_s += step;
+        self.laws.iter_mut().fold(Action::default(), |sum, law| sum.plus(1.0, &law.act(&moment)))
     }
 }
 

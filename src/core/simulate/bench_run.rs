@@ -9,9 +9,10 @@ use super::simulation::{NotFinite, SENSOR_STREAM, SimulationSettings, TICK_S};
 use super::statistics::{Summary, between, summary};
 use super::tracking::StepResponse;
 use crate::control::{Readings, SpeedPi, SpeedProgram, SpeedRun};
-use crate::friction::Stribeck;
+use crate::effects::{Effect, EffectFeedforward, EffectLaw, Machine, Moment};
+use crate::friction::{Compensation, Stribeck};
 use crate::identify::Motor;
-use crate::model_file::{AxisModel, RobotModel};
+use crate::model_file::{AxisModel, AxisParameters, RobotModel};
 use crate::record::BenchSample;
 use crate::robot::{Actuation, MotorLimits, SensorSettings};
 
@@ -58,6 +59,8 @@ pub(super) struct BenchRig {
     limits: MotorLimits,
     pub(super) actuation: Actuation,
     sensors: SensorSettings,
+    machine: Machine,
+    pub(super) effects: Vec<Effect>,
     /// One shaft in place of two.
     single: bool,
 }
@@ -70,6 +73,7 @@ impl BenchRig {
 
     /// Both wheels of a robot.
     pub(super) fn of_robot(robot: &RobotModel) -> Self {
+        let robot = robot.with_effects_declared();
         Self {
             inertia_kg_m2: robot.parameters.wheel_inertia_kg_m2,
             gravity_torque_nm: 0.0,
@@ -77,13 +81,18 @@ impl BenchRig {
             limits: robot.limits,
             actuation: robot.actuation,
             sensors: robot.sensors,
+            machine: Machine::wheel_in_air(&robot),
+            effects: robot.effects,
             single: false,
         }
     }
 
     /// A rotary axis; none for a carriage.
     pub(super) fn of_axis(axis: &AxisModel) -> Option<Self> {
-        let AxisModel::Rotary { inertia_kg_m2, gravity_torque_nm, friction } = *axis else { return None };
+        let axis = axis.with_effects_declared();
+        let AxisParameters::Rotary { inertia_kg_m2, gravity_torque_nm, friction } = axis.parameters else {
+            return None;
+        };
         Some(Self {
             inertia_kg_m2,
             gravity_torque_nm,
@@ -91,8 +100,21 @@ impl BenchRig {
             limits: MotorLimits::default(),
             actuation: Actuation::default(),
             sensors: SensorSettings::default(),
+            machine: Machine::axis(&axis),
+            effects: axis.effects,
             single: true,
         })
+    }
+
+    /// Laws of the effects on one of the shafts.
+    fn laws(&self, motor: Motor) -> Vec<EffectLaw> {
+        let own = self.effects.iter().filter(|effect| self.single || effect.is_in(motor));
+        own.map(|effect| effect.law(&self.machine)).collect()
+    }
+
+    /// Feedforward of its effects.
+    pub(super) fn feedforward(&self, compensation: Compensation) -> Option<EffectFeedforward> {
+        EffectFeedforward::new(&self.machine, &self.effects, compensation)
     }
 
     pub(super) fn torque_limit_nm(&self) -> f64 {
@@ -104,21 +126,23 @@ impl BenchRig {
 struct Bench<'a> {
     rig: &'a BenchRig,
     control: SpeedRun,
+    fed: Option<EffectFeedforward>,
     shafts: [BenchPlant; 2],
     motors: Motors,
     sensors: Sensors,
 }
 
-/// Runs a program for `ticks` under the speed control; `watch` hears the share that is done.
+/// Runs a program for `ticks` under the speed control, with effects fed forward or not; `watch` hears the share that is done.
 pub(super) fn run(
     rig: &BenchRig,
     control: &[SpeedPi; 2],
+    fed: Option<EffectFeedforward>,
     program: &SpeedProgram,
     ticks: usize,
     seed: u64,
     watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> BenchRun {
-    let mut bench = Bench::new(rig, SpeedRun::new(*control, program.clone()), seed);
+    let mut bench = Bench::new(rig, SpeedRun::new(*control, program.clone()), fed, seed);
     let mut samples: Vec<BenchSample> = Vec::with_capacity(ticks);
     let mut not_finite = None;
     for tick in 0..ticks {
@@ -140,13 +164,15 @@ pub(super) fn run(
 }
 
 impl<'a> Bench<'a> {
-    fn new(rig: &'a BenchRig, control: SpeedRun, seed: u64) -> Self {
+    fn new(rig: &'a BenchRig, control: SpeedRun, fed: Option<EffectFeedforward>, seed: u64) -> Self {
         let shaft = |motor: usize| {
             BenchPlant::new(rig.inertia_kg_m2, rig.gravity_torque_nm, rig.friction[motor], 0.0, 0.0)
+                .with_effects(rig.laws(Motor::BOTH[motor]))
         };
         Self {
             rig,
             control,
+            fed,
             shafts: [0, 1].map(shaft),
             motors: Motors::new(&rig.limits, &rig.actuation, seed),
             sensors: Sensors::new(rig.sensors, seed, SENSOR_STREAM),
@@ -164,6 +190,7 @@ impl<'a> Bench<'a> {
         let readings = self.sensors.read(&truth, tick);
         let target_speed_rad_s = self.control.target_rad_s(time_s);
         let torque_nm = self.control.step(time_s, readings.motor_speed_rad_s);
+        let torque_nm = self.with_effects(&readings, torque_nm);
         self.advance(torque_nm);
         let mut sample = BenchSample {
             time_s: self.sensors.stamp(tick),
@@ -179,6 +206,21 @@ impl<'a> Bench<'a> {
             once(&mut sample.torque_nm);
         }
         sample
+    }
+
+    /// What has to be asked of the motors for torques.
+    fn with_effects(&self, readings: &Readings, torque_nm: [f64; 2]) -> [f64; 2] {
+        let Some(fed) = &self.fed else { return torque_nm };
+        let limit_nm = self.rig.torque_limit_nm();
+        Motor::BOTH.map(|motor| {
+            let index = motor as usize;
+            let moment = Moment {
+                motor_angle_rad: readings.motor_angle_rad[index],
+                motor_speed_rad_s: readings.motor_speed_rad_s[index],
+                ..Moment::default()
+            };
+            fed.asked_nm(motor, &moment, torque_nm[index]).clamp(-limit_nm, limit_nm)
+        })
     }
 
     fn advance(&mut self, asked_nm: [f64; 2]) {

@@ -13,6 +13,7 @@ use crate::ParameterError;
 use crate::control::{
     BalanceController, ControlError, ControllerKind, DEFAULT_COMPENSATION, SpeedGains, SpeedPi, SpeedProgram,
 };
+use crate::effects::EffectFeedforward;
 use crate::friction::{Compensation, Feedforward};
 use crate::identify::Motor;
 use crate::identify::excitation::{SpeedSweep, Step};
@@ -256,8 +257,8 @@ pub fn run(
             let course = Course::new(experiment.scenario, experiment.seconds, &experiment.kick);
             Outcome::Ground(course.run(&actual, controller, experiment.seed, warnings, watch)?)
         }
-        Plan::Bench { control, program, actual, .. } => {
-            let run = bench_run::run(&actual, &control, &program, ticks, experiment.seed, watch);
+        Plan::Bench { control, fed, program, actual, .. } => {
+            let run = bench_run::run(&actual, &control, fed, &program, ticks, experiment.seed, watch);
             Outcome::Bench(BenchRun { warnings, ..run })
         }
     };
@@ -278,6 +279,7 @@ enum Plan {
     },
     Bench {
         control: [SpeedPi; 2],
+        fed: Option<EffectFeedforward>,
         program: SpeedProgram,
         gains: SpeedGains,
         declared: Box<BenchRig>,
@@ -434,12 +436,11 @@ impl Plan {
         let [declared, actual] = [experiment.rig(declared)?, experiment.rig(actual).map_err(of_actual)?];
         let (program, gains) = experiment.program(&declared)?;
         let compensated = experiment.controller == ControllerChoice::Flqr;
-        let control = speed_control(
-            &declared,
-            gains,
-            compensated.then_some(compensation.unwrap_or(DEFAULT_COMPENSATION)),
-        )?;
-        Ok(Self::Bench { control, program, gains, declared: Box::new(declared), actual: Box::new(actual) })
+        let compensation = compensated.then_some(compensation.unwrap_or(DEFAULT_COMPENSATION));
+        let control = speed_control(&declared, gains, compensation)?;
+        let fed = compensation.and_then(|compensation| declared.feedforward(compensation));
+        let (declared, actual) = (Box::new(declared), Box::new(actual));
+        Ok(Self::Bench { control, fed, program, gains, declared, actual })
     }
 
     fn warnings(&self) -> Vec<String> {
@@ -487,7 +488,8 @@ fn speed_control(
     gains: SpeedGains,
     compensation: Option<Compensation>,
 ) -> Result<[SpeedPi; 2], ExperimentError> {
-    if compensation.is_some() && rig.friction.iter().all(Option::is_none) {
+    let fed = compensation.and_then(|compensation| rig.feedforward(compensation));
+    if compensation.is_some() && fed.is_none() && rig.friction.iter().all(Option::is_none) {
         return Err(ControlError::NoFriction.into());
     }
     let mut control = [SpeedPi {

@@ -10,8 +10,9 @@ use super::simulation::{
     FALL_PITCH_RAD, Fall, NotFinite, SENSOR_STREAM, SimulationError, SimulationSettings, TICK_S,
 };
 use crate::control::Readings;
+use crate::effects::{Machine, RobotLaws};
 use crate::model_file::RobotModel;
-use crate::robot::State;
+use crate::robot::{Motor, State};
 
 /// A simulated robot, one tick of 1 ms at a time, under whatever torques it is asked for.
 #[derive(Clone, Debug)]
@@ -42,6 +43,7 @@ impl SimulatedRobot {
         settings: &SimulationSettings,
         grounds: &[Ground; 2],
     ) -> Result<Self, SimulationError> {
+        let robot = &robot.with_effects_declared();
         robot.validate()?;
         settings.validate()?;
         grounds.iter().try_for_each(Ground::validate)?;
@@ -67,8 +69,13 @@ impl SimulatedRobot {
     /// Robot or settings out of range.
     pub fn in_air(robot: &RobotModel, settings: &SimulationSettings) -> Result<Self, SimulationError> {
         let on_ground = Self::on_ground(robot, settings, &[const { Ground::flat() }; 2])?;
+        let robot = robot.with_effects_declared();
         let inertia_kg_m2 = robot.parameters.wheel_inertia_kg_m2;
-        let shafts = robot.friction.map(|friction| BenchPlant::new(inertia_kg_m2, 0.0, friction, 0.0, 0.0));
+        let laws = RobotLaws::new(&Machine::wheel_in_air(&robot), &robot.effects);
+        let shafts = Motor::BOTH.map(|motor| {
+            BenchPlant::new(inertia_kg_m2, 0.0, robot.friction[motor as usize], 0.0, 0.0)
+                .with_effects(laws.clone().into_motor(motor))
+        });
         Ok(Self { lifted: Some(shafts), ..on_ground })
     }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use egui::{ProgressBar, RichText, TextEdit, Ui};
 use flqr_core::friction::{Stribeck, StribeckParameters};
 use flqr_core::identify::{Bounds, FitOptions, FitProgress, FitReport, Method, Motor, fit};
-use flqr_core::model_file::{AxisModel, Model, Rig};
+use flqr_core::model_file::{AxisParameters, Model, Rig};
 use flqr_core::record::LogKind;
 
 use super::fitted::Fitted;
@@ -64,7 +64,8 @@ impl Default for FitRun {
 
 /// The session's model where it describes what the log records; a log of something else is fitted without.
 fn fitting_model(kind: Option<LogKind>, model: Model) -> Option<Model> {
-    let linear_model = matches!(model.rig, Rig::Axis(AxisModel::Linear { .. }));
+    let linear_model =
+        matches!(&model.rig, Rig::Axis(axis) if matches!(axis.parameters, AxisParameters::Linear { .. }));
     (linear_model == (kind == Some(LogKind::LinearAxis))).then_some(model)
 }
 

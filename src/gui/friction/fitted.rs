@@ -2,7 +2,7 @@
 
 use flqr_core::friction::{Stribeck, StribeckParameters};
 use flqr_core::identify::FitReport;
-use flqr_core::model_file::{AxisModel, Rig};
+use flqr_core::model_file::{AxisParameters, Rig};
 
 use crate::command::Target;
 
@@ -56,7 +56,8 @@ impl Fitted {
     /// # Errors
     /// A sentence where the units are of the other kind of axis.
     pub(crate) fn check(&self, rig: &Rig) -> Result<(), String> {
-        let model_is_linear = matches!(rig, Rig::Axis(AxisModel::Linear { .. }));
+        let model_is_linear =
+            matches!(rig, Rig::Axis(axis) if matches!(axis.parameters, AxisParameters::Linear { .. }));
         let problem = match (self, model_is_linear) {
             (Self::Linear { .. }, true) | (Self::Rotary { .. }, false) => return Ok(()),
             (Self::Linear { .. }, false) => {
@@ -89,28 +90,28 @@ impl Fitted {
                     Target::Both => "Both motors have the fitted friction, the simulated robot too.",
                 });
             }
-            (fitted, Rig::Axis(axis)) => fitted.put_into_axis(axis),
+            (fitted, Rig::Axis(axis)) => fitted.put_into_axis(&mut axis.parameters),
         }
         Ok("The axis has the fitted values.")
     }
 
-    fn put_into_axis(self, axis: &mut AxisModel) {
+    fn put_into_axis(self, axis: &mut AxisParameters) {
         match (self, axis) {
-            (Self::Linear { curve, mass_kg: fitted }, AxisModel::Linear { mass_kg, friction }) => {
+            (Self::Linear { curve, mass_kg: fitted }, AxisParameters::Linear { mass_kg, friction }) => {
                 *friction = Some(curve);
                 *mass_kg = fitted.unwrap_or(*mass_kg);
             }
             (
                 Self::Rotary { curve, inertia_kg_m2: fitted, gravity_torque_nm: load },
-                AxisModel::Rotary { inertia_kg_m2, gravity_torque_nm, friction },
+                AxisParameters::Rotary { inertia_kg_m2, gravity_torque_nm, friction },
             ) => {
                 *friction = Some(curve);
                 *inertia_kg_m2 = fitted.unwrap_or(*inertia_kg_m2);
                 *gravity_torque_nm = load.unwrap_or(*gravity_torque_nm);
             }
             // `check` has refused these.
-            (Self::Linear { .. }, AxisModel::Rotary { .. })
-            | (Self::Rotary { .. }, AxisModel::Linear { .. }) => {}
+            (Self::Linear { .. }, AxisParameters::Rotary { .. })
+            | (Self::Rotary { .. }, AxisParameters::Linear { .. }) => {}
         }
     }
 }

@@ -10,7 +10,7 @@ use common::{ROBOT, SIZE, TempFile, Window, click, enter, open, options, random_
 use egui::accesskit::Role;
 use egui::{Event, Key, Modifiers, Pos2, Vec2, vec2};
 use egui_kittest::kittest::Queryable;
-use flqr_core::model_file::{AxisModel, Model, Rig, presets};
+use flqr_core::model_file::{AxisParameters, Model, Rig, presets};
 use flqr_gui::{Tab, WindowOptions};
 use serde_json::Value;
 
@@ -256,11 +256,9 @@ fn a_fit_of_a_motion_goes_into_the_axis_with_inertia_or_mass() {
         window.key_press_modifiers(Modifiers::COMMAND, Key::S);
         until(&mut window, "saving", |s| s["unsaved_changes"] == false);
         let saved = Model::from_toml(&std::fs::read_to_string(&file.0).unwrap(), "saved").unwrap();
-        let (Rig::Axis(AxisModel::Linear { mass_kg: inertia, friction })
-        | Rig::Axis(AxisModel::Rotary { inertia_kg_m2: inertia, friction, .. })) = saved.rig
-        else {
-            panic!("{saved:?}")
-        };
+        let Rig::Axis(axis) = &saved.rig else { panic!("{saved:?}") };
+        let (AxisParameters::Linear { mass_kg: inertia, friction }
+        | AxisParameters::Rotary { inertia_kg_m2: inertia, friction, .. }) = axis.parameters;
         let curve = *friction.unwrap().parameters();
         for (found, true_value, tolerance) in [
             (inertia, 20.0, 0.4),

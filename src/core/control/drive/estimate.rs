@@ -5,7 +5,7 @@
 //!   momentum: without ΣT, which enters Eqs. 4 and 5 with opposite signs, and with ẍ = r (q̈ + θ̈), their sum is
 //!   (c₂ + c₃ + r (c₁ + c₅)) θ̈ = c₄ θ − r (c₁ + c₅) q̈. The motor speeds stand for the torque, so that neither the
 //!   friction nor the scale of the torque matters.
-//! - From the motors' reading to the new torque, which the model says is `actuation.delay_s` later, the linear model
+//! - From the motors' reading to the new torque, which the model says is `torque_delay_s` later, the linear model
 //!   (Eq. 11) moves on under the torques that have been asked for already and have not acted yet, less the friction of
 //!   the model, which holds a shaft that it can stop within a step; the turning robot goes on turning at its rate.
 //! - The mean of the motor speeds, read in steps of 1 deg/s, is smoothed by the same model: each tick it moves on under
@@ -69,8 +69,8 @@ impl Estimator {
             odometry: Odometry::new(robot),
             laws: robot.parameters.coefficients(),
             friction: robot.friction,
-            delay_s: robot.actuation.delay_s,
-            imu_latency_s: robot.sensors.imu_latency_s,
+            delay_s: robot.torque_delay_s(),
+            imu_latency_s: robot.with_effects_declared().sensors.imu_latency_s,
             motors: [None; 2],
             imu: None,
             origin_rad: None,

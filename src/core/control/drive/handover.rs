@@ -29,14 +29,15 @@ impl Handover {
         if self.before.is_some() {
             self.waiting = Some(controller);
         } else {
-            self.before = Some((self.current, 0));
-            self.current = controller;
+            self.before = Some((std::mem::replace(&mut self.current, controller), 0));
         }
     }
 
     /// The last controller that was given, at once, for motors that are off.
     pub(super) fn finish(&mut self) {
-        self.current = self.waiting.take().unwrap_or(self.current);
+        if let Some(last) = self.waiting.take() {
+            self.current = last;
+        }
         self.before = None;
     }
 

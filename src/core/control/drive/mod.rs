@@ -12,7 +12,8 @@
 //!
 //! Torques stay within `torque_nm` and change by `torque_slew_nm_s` at most, both of `[limits]`; only the stop is not
 //! slewed. Way, heading and motor angles count from where the robot was armed, motor angles such that
-//! x = r (q + θ) = 0 there; while checking, from the first reading.
+//! x = r (q + θ) = 0 there; while checking, from the first reading. So the rotors' own angles are not known, and
+//! effects that depend on them, as cogging, are not fed forward.
 
 mod checks;
 mod estimate;
@@ -68,6 +69,8 @@ pub struct Drive {
     program: Program,
     checks: Checks,
     torque_scale: TorqueScale,
+    /// Whether the controller feeds effects forward that depend on angles which are not known here.
+    loses_effects: bool,
     reference: Reference,
     asked_nm: [f64; 2],
     armed: Duration,
@@ -92,7 +95,8 @@ impl Drive {
     ) -> Result<Self, DriveError> {
         robot.validate()?;
         let torque_limit_nm = torque_limit(robot)?;
-        let program = Program::new(robot, controller, excitation, torque_limit_nm)?;
+        let loses_effects = controller.needs_rotor_angle();
+        let program = Program::new(robot, controller.without_rotor_angle(), excitation, torque_limit_nm)?;
         Ok(Self {
             settings,
             torque_limit_nm,
@@ -103,6 +107,7 @@ impl Drive {
             checks: Checks::new(program.balances(), Duration::ZERO),
             torque_scale: TorqueScale::new(robot, program.balances(), torque_limit_nm),
             program,
+            loses_effects,
             reference: Reference::default(),
             asked_nm: [0.0; 2],
             armed: Duration::ZERO,
@@ -165,7 +170,9 @@ impl Drive {
             (DriveOrder::Arm, Stage::Checking) => self.arm(now, output),
             (DriveOrder::Release, Stage::Checking | Stage::Stopped(_)) => self.release(output),
             (DriveOrder::Release, Stage::Listening) => {}
-            (DriveOrder::Controller(controller), stage) => self.take_over(**controller, stage, output),
+            (DriveOrder::Controller(controller), stage) => {
+                self.take_over((**controller).clone(), stage, output);
+            }
             (DriveOrder::Reference(reference), _) => self.refer_to(reference, output),
             (DriveOrder::Check, _) => refuse(output, "to check the robot, release it first"),
             (DriveOrder::Arm, _) => refuse(output, "to arm the robot, let it be checked first"),
@@ -174,6 +181,11 @@ impl Drive {
     }
 
     fn begin_checks(&mut self, now: Duration, output: &mut Output) {
+        if self.loses_effects {
+            let text =
+                "effects that depend on the rotors' own angles are not fed forward: angles count from arming";
+            output.events.push(DriveEvent::Warning(text.to_owned()));
+        }
         self.checks = Checks::new(self.program.balances(), now);
         (self.next_health, self.next_state, self.next_checks) = (now, now, now);
         self.reach(Stage::Checking, output);
@@ -215,7 +227,7 @@ impl Drive {
         if !controller.gain.iter().all(|gain| gain.is_finite()) {
             return refuse(output, "the new controller has a gain that is no number and is not taken");
         }
-        handover.hand_over(controller);
+        handover.hand_over(controller.without_rotor_angle());
         if stage != Stage::Driving {
             handover.finish();
         }

@@ -291,7 +291,7 @@ fn role(options: &SessionOptions) -> Result<Role, DriveError> {
         SessionMode::Listen => Role::Listen(Box::new(listener(options))),
         SessionMode::Drive { controller, excitation } => Role::Drive(Box::new(Drive::new(
             &options.robot,
-            **controller,
+            (**controller).clone(),
             *excitation,
             DriveSettings::default(),
         )?)),

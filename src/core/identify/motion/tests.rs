@@ -277,8 +277,8 @@ fn a_slowly_sampled_pendulum_needs_its_gravity() {
         ..SHAFT
     };
     let log = [pendulum.log(Axis::Rotary)];
-    let model = AxisModel::Rotary { inertia_kg_m2: 0.034, gravity_torque_nm: 1.5, friction: None };
-    let known = KnownAxis::from(&model);
+    let model = AxisParameters::Rotary { inertia_kg_m2: 0.034, gravity_torque_nm: 1.5, friction: None };
+    let known = KnownAxis::from(&AxisModel::new(model));
     let expected =
         [("inertia_kg_m2", 0.034, 0.03), ("viscous_nm_s_rad", 0.05, 0.1), ("coulomb_nm", 0.1, 0.1)];
     check(&fit(&log, Axis::Rotary, Some(&known), &["all"]), &expected);

@@ -111,6 +111,7 @@ impl Emulator {
     /// # Errors
     /// Robot or wiring out of range.
     pub fn new(robot: &RobotModel, settings: EmulatorSettings) -> Result<Self, SimulationError> {
+        let robot = &robot.with_effects_declared();
         let wiring = settings.actual.unwrap_or(robot.link);
         wiring.validate()?;
         let hand = Hand::Rocks { since: 0 };

@@ -187,7 +187,7 @@ fn lock_step_over_the_wire_has_the_statistics_of_the_simulated_run() {
         let mut host = emulated(EmulatorSettings { seed, ..EmulatorSettings::default() });
         host.read_for(5);
         let settings = SimulationSettings { seed, ..SimulationSettings::default() };
-        let mut simulation = Simulation::new(&robot, controller, settings).unwrap();
+        let mut simulation = Simulation::new(&robot, controller.clone(), settings).unwrap();
         let pure: Vec<Sample> = (0..60_000).map(|_| simulation.step()).collect();
         for (samples, sums) in [host.balance(&controller, 60_000), pure].iter().zip(&mut variances) {
             let Statistics { x_m, x_dot_m_s, pitch_rad, fell, settled, .. } =

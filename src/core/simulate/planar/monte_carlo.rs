@@ -23,7 +23,8 @@ const SIDE_BY_SIDE: usize = 64;
 /// Integration steps a tick.
 const SUBSTEPS: u32 = 10;
 
-/// One robot under control, in its plane: heading, ground, legs and sensors take no part.
+/// One robot under control, in its plane: heading, ground, legs, sensors and effects take no part, nor does the
+/// feedforward of effects.
 #[derive(Clone, Debug)]
 pub struct Trial {
     /// The robot that moves: its parameters, friction, motors' limits, transport delay and torque noise count.
@@ -113,7 +114,7 @@ impl Loop {
         let RobotModel { limits, actuation, .. } = &trial.robot;
         Self {
             index,
-            controller: trial.controller,
+            controller: BalanceController { effects: None, ..trial.controller.clone() },
             actuators: [0, 1].map(|_| Actuator::new(limits, actuation)),
             noise: [0, 1].map(|motor| Noise::new(trial.seed, motor)),
             torque_noise_nm: actuation.torque_noise_nm,

@@ -43,10 +43,14 @@ pub(super) struct Laws {
 }
 
 /// What acts during one call, with the angles at its start.
+#[derive(Clone, Copy)]
 pub(super) struct Loads {
     pub(super) torque_nm: [f64; 2],
     push_n: f64,
     push_height_m: f64,
+    /// Horizontal force and torque on the body of the effects, the push included in the force.
+    along_n: f64,
+    about_nm: f64,
     lean: NearAngle,
     yaw: NearAngle,
     pieces: [usize; 2],
@@ -67,6 +71,18 @@ pub(super) struct Response {
     half_difference_per_difference: f64,
     /// Speed up the slope, m/s.
     pub(super) uphill: f64,
+}
+
+impl Loads {
+    /// The same with what effects add: torques inside both motors, a force at the axle and a torque on the body.
+    pub(super) fn with(&self, motors_nm: [f64; 2], axle_n: f64, body_nm: f64) -> Self {
+        Self {
+            torque_nm: [0, 1].map(|i: usize| self.torque_nm[i] + motors_nm[i]),
+            along_n: self.along_n + axle_n,
+            about_nm: self.about_nm + body_nm,
+            ..*self
+        }
+    }
 }
 
 impl Response {
@@ -191,6 +207,8 @@ impl Laws {
             torque_nm: forcing.torque_nm,
             push_n: forcing.push_n,
             push_height_m: forcing.push_height_m,
+            along_n: forcing.push_n,
+            about_nm: 0.0,
             lean: NearAngle::new(at.lean),
             // Heading matters on a slope only.
             yaw: NearAngle::new(if self.is_sloped() { self.yaw(at) } else { 0.0 }),
@@ -273,9 +291,13 @@ impl Laws {
 
         let (pull_along, pull_about) = self.tether_pull(at, lean);
         let push_about = loads.push_height_m * self.body_axis((sin, cos)).1 * loads.push_n;
-        let along = moment_sin * (rate * rate + spin) + loads.push_n + footing.along + pull_along;
-        let about =
-            swing * spin + moment_sin * forward * footing.tilt_rate + footing.about + push_about + pull_about;
+        let along = moment_sin * (rate * rate + spin) + loads.along_n + footing.along + pull_along;
+        let about = swing * spin
+            + moment_sin * forward * footing.tilt_rate
+            + footing.about
+            + push_about
+            + pull_about
+            + loads.about_nm;
         let turning =
             footing.turning - (moment_sin * forward + swing * (2.0 * rate + footing.tilt_rate)) * yaw_rate;
 

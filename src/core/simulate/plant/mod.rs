@@ -20,6 +20,7 @@
 //!   the robot and rolls it by asin((z_r − z_l)/b), which takes cos(roll) of the weight's moment and shifts
 //!   weight to the lower wheel; the path's curvature.
 //! - A push on the body along the path, a tether, a payload, which moves the centre of mass.
+//! - Those of [`crate::effects`] that the model lists.
 //!
 //! Neglected: slip of the tyres, their springiness and the turning torque of their contact patches; wheels
 //! that leave the ground; the inertia of rolling; forces of the air; motion of the legs; the difference
@@ -36,6 +37,7 @@
 //! that is consistent with both ranges.
 
 mod body;
+mod effects;
 mod laws;
 mod motion;
 mod shafts;
@@ -46,6 +48,7 @@ use super::ground::Ground;
 use super::planar::Forcing;
 use crate::model_file::RobotModel;
 use crate::robot::State;
+use effects::Effects;
 use laws::{Laws, Loads};
 use motion::{Motion, Smooth, runge_kutta};
 use shafts::{Phase, Phases, Shaft, margins, settled, shaft_torques, turning_torques};
@@ -57,6 +60,7 @@ pub struct Plant {
     shafts: [Shaft; 2],
     motion: Motion,
     phases: Phases,
+    effects: Option<Box<Effects>>,
 }
 
 /// Where the robot is, and how it stands and moves: the truth behind the sensors.
@@ -75,8 +79,8 @@ pub struct Pose {
 }
 
 impl Plant {
-    /// A robot with its model's surroundings, at `start` with heading 0 and no yaw rate. The model is taken
-    /// as validated.
+    /// A robot with its model's surroundings and effects, at `start` with heading 0 and no yaw rate. The model is
+    /// taken as validated, with effects that are errors of declared numbers put into these.
     pub fn new(robot: &RobotModel, start: &State) -> Self {
         Self::on_ground(robot, &[const { Ground::flat() }; 2], start)
     }
@@ -86,8 +90,13 @@ impl Plant {
     pub fn on_ground(robot: &RobotModel, grounds: &[Ground; 2], start: &State) -> Self {
         let grounds = Self::grounds_under(robot, grounds);
         let laws = Laws::new(&robot.parameters, &robot.chassis, &robot.surroundings, grounds);
-        let shafts = robot.friction.map(Shaft::new);
-        let mut plant = Self { laws, shafts, motion: Motion::default(), phases: [Phase::Free; 2] };
+        let mut shafts = robot.friction.map(Shaft::new);
+        let effects = Effects::new(robot);
+        if effects.is_some() {
+            shafts.iter_mut().for_each(Shaft::allow_added);
+        }
+        let phases = [Phase::Free; 2];
+        let mut plant = Self { laws, shafts, motion: Motion::default(), phases, effects };
         plant.place(start);
         plant
     }
@@ -109,9 +118,33 @@ impl Plant {
     pub fn advance(&mut self, forcing: &Forcing, dt_s: f64, substeps: u32) {
         let loads = self.laws.loads(forcing, &self.motion);
         let step = dt_s / f64::from(substeps);
+        if self.effects.is_some() {
+            return self.advance_with_effects(&loads, step, substeps);
+        }
         // Held shafts have been checked at the end of each substep, but under the loads of that call.
         self.release(&loads);
         pulp::Arch::new().dispatch(Advance { plant: self, loads, step, substeps });
+    }
+
+    /// The same where effects act, which are held over each substep at what they are in its middle.
+    #[cold]
+    #[inline(never)]
+    fn advance_with_effects(&mut self, loads: &Loads, step: f64, substeps: u32) {
+        let Some(mut effects) = self.effects.take() else { return };
+        for _ in 0..substeps {
+            let (motors, whole) = effects.act(self, loads.torque_nm, step);
+            for (shaft, action) in self.shafts.iter_mut().zip(&motors) {
+                shaft.add(action.friction_nm);
+            }
+            let loads = loads.with(motors.map(|action| action.motor_nm), whole.axle_n, whole.body_nm);
+            self.release(&loads);
+            if self.laws.is_even() {
+                self.substeps::<false>(&loads, step, 1);
+            } else {
+                self.substeps::<true>(&loads, step, 1);
+            }
+        }
+        self.effects = Some(effects);
     }
 
     /// The true state.

@@ -25,15 +25,33 @@ pub(super) struct Shaft {
     sliding: SlidingFriction,
     /// Torques that friction can take at rest, N m; none where no torque is needed to turn a resting shaft.
     range_nm: Option<RangeInclusive<f64>>,
+    /// Level of dry friction on top of the curve's, N m.
+    added_nm: f64,
+    /// The least that may be added, N m.
+    least_nm: f64,
 }
 
 impl Shaft {
     pub(super) fn new(friction: Option<Stribeck>) -> Self {
         let range = friction.map(|curve| curve.stick_range_nm());
+        let level = |curve: Stribeck| curve.parameters().coulomb_nm.min(curve.parameters().static_nm);
         Self {
             sliding: SlidingFriction::new(friction),
             range_nm: range.filter(|range| range.end() > range.start()),
+            added_nm: 0.0,
+            least_nm: -friction.map_or(0.0, level),
         }
+    }
+
+    /// Lets effects add dry friction, also where the curve has none.
+    pub(super) fn allow_added(&mut self) {
+        let offset = self.sliding.torque_nm(0.0, 0.0);
+        self.range_nm.get_or_insert(offset..=offset);
+    }
+
+    /// Adds dry friction to the curve's from now on; no level gets below 0.
+    pub(super) fn add(&mut self, level_nm: f64) {
+        self.added_nm = if level_nm < self.least_nm { self.least_nm } else { level_nm };
     }
 
     /// Phase of a shaft that turns at a speed or rests.
@@ -51,13 +69,13 @@ impl Shaft {
     #[inline(always)]
     fn friction_nm(&self, phase: Phase, speed: f64) -> f64 {
         let direction = if let Phase::Slide(direction) = phase { direction } else { speed.signum() };
-        self.sliding.torque_nm(speed, direction)
+        self.sliding.torque_nm(speed, direction) + direction * self.added_nm
     }
 
     /// Distance of the friction that would hold the shaft from the nearer end of its range, N m.
     fn reserve_nm(&self, holding_nm: f64) -> f64 {
         let Some(range) = &self.range_nm else { return f64::INFINITY };
-        (range.end() - holding_nm).min(holding_nm - range.start())
+        (range.end() - holding_nm).min(holding_nm - range.start()) + self.added_nm
     }
 }
 

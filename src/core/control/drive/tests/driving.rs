@@ -21,7 +21,7 @@ fn without_compensation_it_is_the_simulated_loop_to_the_last_bit() {
     for (kind, seed) in [(ControllerKind::Lqr, 1), (ControllerKind::Flqr, 2)] {
         let robot = calm();
         let control = controller(&robot, kind);
-        let drive = Drive::new(&robot, control, Excitation::Balance, PLAIN).unwrap();
+        let drive = Drive::new(&robot, control.clone(), Excitation::Balance, PLAIN).unwrap();
         let mut rig = Rig::new(&robot, drive, false, false, seed);
         let armed = rig.arm();
         rig.run(5.0);

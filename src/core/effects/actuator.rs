@@ -1,0 +1,209 @@
+//! Between the torque that is asked for and the one on the shaft.
+//!
+//! Each is what has to be added to the torque that is asked for.
+
+use std::collections::VecDeque;
+
+use super::kind::{EffectKind, Feedforward, Parameter, Place, undeclared};
+use super::law::{Action, Moment, Term};
+use super::machine::MachineKind;
+
+const EVERYWHERE: &[MachineKind] = &[MachineKind::Robot, MachineKind::Rotary, MachineKind::Linear];
+
+/// Bus, queue and firmware.
+pub(super) static COMMAND_DELAY: EffectKind = EffectKind {
+    id: "command_delay",
+    summary: "the torque acts a fixed time after it is asked for",
+    place: Place::Actuator,
+    machines: EVERYWHERE,
+    parameters: &[Parameter::shape("delay_s", [0.0, 0.5], "time from asking to acting")],
+    series: false,
+    make_terms: |_, shape| {
+        let mut line = DelayLine::new(shape[0]);
+        vec![Term::fixed(move |m: &Moment| Action::motor(line.delayed(m.torque_nm, m.dt_s) - m.torque_nm))]
+    },
+    separated_by: "torque with much of its power above 30 Hz",
+    feedforward: Feedforward::Never("a torque cannot act before it is asked for"),
+    declare: undeclared,
+};
+
+/// The current's own control loop.
+pub(super) static ACTUATOR_LAG: EffectKind = EffectKind {
+    id: "actuator_lag",
+    summary: "the torque follows the one that is asked for with a first-order lag",
+    place: Place::Actuator,
+    machines: EVERYWHERE,
+    parameters: &[Parameter::shape("time_constant_s", [1e-5, 1.0], "time to 63 % of a step")],
+    series: false,
+    make_terms: |_, shape| {
+        let mut lag = Lag::new(shape[0]);
+        vec![Term::fixed(move |m: &Moment| Action::motor(lag.mean(m.torque_nm, m.dt_s) - m.torque_nm))]
+    },
+    separated_by: "torque with much of its power above 30 Hz",
+    feedforward: Feedforward::Never("leading the torque would multiply the noise of the sensors"),
+    declare: undeclared,
+};
+
+/// A torque constant, or its declared value, that is off.
+pub(super) static TORQUE_GAIN: EffectKind = EffectKind {
+    id: "torque_gain",
+    summary: "the torque is another than the one that is asked for by a constant share",
+    place: Place::Actuator,
+    machines: EVERYWHERE,
+    parameters: &[Parameter::amplitude("gain", [-0.9, 10.0], "share of the torque that is added to it")],
+    series: false,
+    make_terms: |_, _| vec![Term::new("gain", |m: &Moment| Action::motor(m.torque_nm))],
+    separated_by: "a known payload, or a known weight on a lever",
+    feedforward: Feedforward::Causal,
+    declare: undeclared,
+};
+
+/// A limit that the asker does not know of.
+pub(super) static TORQUE_SATURATION: EffectKind = EffectKind {
+    id: "torque_saturation",
+    summary: "the torque is cut at a limit",
+    place: Place::Actuator,
+    machines: EVERYWHERE,
+    parameters: &[
+        Parameter::shape("limit_nm", [1e-4, 1000.0], "largest torque").linear("limit_n", [1e-3, 1e6])
+    ],
+    series: false,
+    make_terms: |_, shape| {
+        let limit = shape[0];
+        let cut = move |torque: f64| torque.clamp(-limit, limit);
+        vec![Term::fixed(move |m: &Moment| Action::motor(cut(m.torque_nm) - m.torque_nm))]
+    },
+    separated_by: "steps of rising size",
+    feedforward: Feedforward::Never("what is beyond the limit cannot be asked for"),
+    declare: undeclared,
+};
+
+/// Small torques that are lost.
+pub(super) static TORQUE_DEADZONE: EffectKind = EffectKind {
+    id: "torque_deadzone",
+    summary: "of any torque a constant part is lost, and of a small one all of it",
+    place: Place::Actuator,
+    machines: EVERYWHERE,
+    parameters: &[Parameter::shape("width_nm", [0.0, 10.0], "torque up to which nothing acts")
+        .linear("width_n", [0.0, 1e4])],
+    series: false,
+    make_terms: |_, shape| {
+        let width = shape[0];
+        vec![Term::fixed(move |m: &Moment| Action::motor(-m.torque_nm.clamp(-width, width)))]
+    },
+    separated_by: "a slow triangle of torque about zero",
+    feedforward: Feedforward::Never(
+        "its inverse jumps where the torque passes zero, and the motors would chatter there",
+    ),
+    declare: undeclared,
+};
+
+/// Play between rotor and wheel.
+pub(super) static BACKLASH: EffectKind = EffectKind {
+    id: "backlash",
+    summary: "no torque passes while the rotor crosses a gap after each reversal of the torque",
+    place: Place::Actuator,
+    machines: EVERYWHERE,
+    parameters: &[
+        Parameter::shape("gap_rad", [0.0, 0.5], "angle of the gap").linear("gap_m", [0.0, 0.05]),
+        Parameter::shape("rotor_inertia_kg_m2", [1e-8, 10.0], "inertia on the motor's side of the gap")
+            .linear("rotor_mass_kg", [1e-4, 1e3]),
+    ],
+    series: false,
+    make_terms: |_, shape| {
+        let mut gap = Gap { width: shape[0], inertia: shape[1], place: None, speed: 0.0 };
+        vec![Term::fixed(move |m: &Moment| {
+            let lost = gap.share_of_time_free(m.torque_nm, m.dt_s);
+            Action::motor(-lost * m.torque_nm)
+        })]
+    },
+    separated_by: "a slow triangle of torque about zero, and an encoder on each side of the gap",
+    feedforward: Feedforward::Never("where the rotor is in its gap is not measured"),
+    declare: undeclared,
+};
+
+/// What was asked for a fixed time ago.
+#[derive(Clone)]
+struct DelayLine {
+    delay_s: f64,
+    /// Torques and their ages, newest first, back to the first that is older than the delay.
+    asked: VecDeque<(f64, f64)>,
+}
+
+impl DelayLine {
+    fn new(delay_s: f64) -> Self {
+        Self { delay_s, asked: VecDeque::new() }
+    }
+
+    /// Mean of what acts until the next moment, where each torque is asked for from its moment to the next; what was
+    /// asked for before the first moment is taken to be the same as then.
+    fn delayed(&mut self, torque: f64, dt_s: f64) -> f64 {
+        for (age_s, _) in &mut self.asked {
+            *age_s += dt_s;
+        }
+        self.asked.push_front((0.0, torque));
+        let older = self.asked.iter().position(|&(age_s, _)| age_s >= self.delay_s);
+        let Some(older) = older else { return self.asked.back().map_or(torque, |&(_, oldest)| oldest) };
+        self.asked.truncate(older + 1);
+        let (old_age, old) = self.asked[older];
+        let Some((young_age, young)) = older.checked_sub(1).map(|at| self.asked[at]) else { return old };
+        old + (young - old) * (old_age - self.delay_s) / (old_age - young_age)
+    }
+}
+
+/// A first-order lag, exact for an input that is constant between moments.
+#[derive(Clone)]
+pub(super) struct Lag {
+    time_constant_s: f64,
+    value: Option<f64>,
+}
+
+impl Lag {
+    pub(super) fn new(time_constant_s: f64) -> Self {
+        Self { time_constant_s, value: None }
+    }
+
+    /// The lagged value at a moment, and the one at the next, `dt_s` later; in balance at the first.
+    pub(super) fn advance(&mut self, input: f64, dt_s: f64) -> [f64; 2] {
+        let now = self.value.unwrap_or(input);
+        let next = input + (now - input) * libm::exp(-dt_s / self.time_constant_s);
+        self.value = Some(next);
+        [now, next]
+    }
+
+    /// Mean between a moment and the next.
+    fn mean(&mut self, input: f64, dt_s: f64) -> f64 {
+        let [now, next] = self.advance(input, dt_s);
+        if dt_s > 0.0 { input + (now - next) * self.time_constant_s / dt_s } else { now }
+    }
+}
+
+/// Where the rotor is in its gap.
+#[derive(Clone)]
+struct Gap {
+    width: f64,
+    inertia: f64,
+    /// From its backward end, rad or m; none before the first moment.
+    place: Option<f64>,
+    speed: f64,
+}
+
+impl Gap {
+    /// Share of the time until the next moment in which the rotor touches neither side.
+    fn share_of_time_free(&mut self, torque: f64, dt_s: f64) -> f64 {
+        let end = if torque >= 0.0 { self.width } else { 0.0 };
+        let place = self.place.unwrap_or(end);
+        let acceleration = torque / self.inertia;
+        let next = place + dt_s * (self.speed + 0.5 * dt_s * acceleration);
+        let speed = self.speed + dt_s * acceleration;
+        if (0.0..=self.width).contains(&next) && place != end {
+            (self.place, self.speed) = (Some(next), speed);
+            return 1.0;
+        }
+        // The side that it hits stops it.
+        let landed = next.clamp(0.0, self.width);
+        let way = next - place;
+        (self.place, self.speed) = (Some(landed), 0.0);
+        if way == 0.0 { 0.0 } else { ((landed - place) / way).clamp(0.0, 1.0) }
+    }
+}
