@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use flqr_core::identify::{self, Bounds, Estimate, FitOptions, FitReport, FrictionPair, Method, Motor};
-use flqr_core::record::{self, ColumnMap, HealthFinding, Log, Mapping, ReadOptions};
+use flqr_core::record::{ColumnMap, HealthFinding, Mapping};
 use serde::Serialize;
 
 use super::input;
@@ -83,7 +83,8 @@ struct Quantity {
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let model = arguments.model.as_deref().map(input::load_model).transpose()?;
     let map = ColumnMap::new(arguments.map.clone()).map_err(Failure::from_error)?;
-    let logs = arguments.logs.iter().map(|path| read_log(path, &map)).collect::<Result<Vec<_>, _>>()?;
+    let logs =
+        arguments.logs.iter().map(|path| input::read_log(path, &map)).collect::<Result<Vec<_>, _>>()?;
     let motor = match arguments.motor {
         MotorName::Left => Motor::Left,
         MotorName::Right => Motor::Right,
@@ -118,19 +119,6 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         warnings: &report.warnings,
     };
     output.result(&keys, |out| print(out, &report))
-}
-
-/// Reads a log with a progress bar.
-fn read_log(path: &Path, map: &ColumnMap) -> Result<Log, Failure> {
-    let (reader, bytes) = input::open(path)?;
-    let source = path.display().to_string();
-    let bar = Progress::new(format!("reading {source}"));
-    let options = ReadOptions::new(map);
-    record::read_log(reader, &source, &options, &mut |progress| {
-        bar.set(progress.bytes, bytes);
-        ControlFlow::Continue(())
-    })
-    .map_err(Failure::from_error)
 }
 
 fn print(out: &mut dyn Write, report: &FitReport) -> io::Result<()> {

@@ -16,7 +16,9 @@ mod monitor;
 mod output;
 mod printer;
 mod progress;
+mod refine;
 mod reproduce;
+mod residual;
 mod riccati;
 mod robot_lines;
 mod simulate;
@@ -52,6 +54,10 @@ enum Command {
     Riccati(riccati::Arguments),
     /// Friction and inertia from bench logs
     Fit(fit::Arguments),
+    /// How far a model is from logs of its machine
+    Residual(residual::Arguments),
+    /// Close the loop with measured data: find what the model lacks and add it
+    Refine(refine::Arguments),
     /// Run the simulated robot
     Simulate(simulate::Arguments),
     /// Every experiment of the paper on the simulated robot, ours beside theirs
@@ -86,6 +92,8 @@ pub(crate) fn run(cli: Cli) -> ExitCode {
         Some(Command::Gains(arguments)) => gains::run(&arguments, &output),
         Some(Command::Riccati(arguments)) => riccati::run(&arguments, &output),
         Some(Command::Fit(arguments)) => fit::run(&arguments, &output),
+        Some(Command::Residual(arguments)) => residual::run(&arguments, &output),
+        Some(Command::Refine(arguments)) => refine::run(&arguments, &output),
         Some(Command::Simulate(arguments)) => simulate::run(&arguments, &output),
         Some(Command::Reproduce(arguments)) => reproduce::run(&arguments, &output),
         Some(Command::Emulate(arguments)) => emulate::run(&arguments, &output),

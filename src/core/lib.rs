@@ -13,6 +13,7 @@
 //! | [`simulate`] | plant with sticking friction, sensors, scenarios |
 //! | [`record`] | logs: schema, reading, writing, health |
 //! | [`identify`] | friction and inertia from logs |
+//! | [`refine`] | the residual of a model, the effects that it lacks, the model with them |
 //! | [`report`] | what was found, as HTML and as text |
 //! | [`reproduce`] | every experiment of the paper, ours beside theirs |
 //! | [`export`] | a controller as C header, JSON, YAML or CSV |
@@ -37,6 +38,7 @@ pub mod model_file;
 pub mod parallel;
 mod parameter;
 pub mod record;
+pub mod refine;
 pub mod report;
 pub mod reproduce;
 pub mod robot;

@@ -28,7 +28,7 @@ pub mod motion;
 mod pairs;
 mod parameters;
 mod polish;
-mod quantile;
+pub mod quantile;
 mod report;
 mod samples;
 mod search_box;

@@ -28,7 +28,7 @@
 //! A parameter that the motion does not excite is held at the model's value, or left out without a model, and
 //! a warning says so.
 
-mod kinematics;
+pub mod kinematics;
 mod problem;
 mod regression;
 mod stribeck_search;

@@ -4,7 +4,7 @@
 ///
 /// With t = √ν tan θ the density is proportional to cos^(ν−1) θ, which is summed over (0, π/2); relative error below
 /// 1e-5. From 1000 degrees of freedom on the first term of the Cornish–Fisher expansion is as good.
-pub(crate) fn student_t_975(degrees_of_freedom: usize) -> f64 {
+pub fn student_t_975(degrees_of_freedom: usize) -> f64 {
     const NORMAL: f64 = 1.959_963_984_540_054;
     const PARTS: usize = 4000;
     let freedom = degrees_of_freedom as f64;

@@ -18,11 +18,15 @@ const LEAST_ROWS: usize = 4;
 const MOST_SAMPLES_PER_ROW: f64 = 4.0;
 
 /// A stretch of a log without gaps, on uniform time.
-pub(super) struct Stretch {
+pub struct Stretch {
+    /// Time of the first sample, s.
+    pub start_s: f64,
     /// Distance of samples, s.
-    pub(super) step_s: f64,
-    pub(super) position: Vec<f64>,
-    pub(super) effort: Vec<f64>,
+    pub step_s: f64,
+    /// Position, rad or m.
+    pub position: Vec<f64>,
+    /// Torque or force, N m or N.
+    pub effort: Vec<f64>,
 }
 
 /// How the stretches of a log are filtered and thinned.
@@ -46,7 +50,7 @@ pub(super) struct Kinematics {
 /// Splits a log where it has gaps, and puts each stretch on uniform time: the position by cubics, so
 /// that jitter adds no corners to be differentiated, the effort linearly. Rows with a value
 /// that is not finite are gaps.
-pub(super) fn stretches(time_s: &[f64], position: &[f64], effort: &[f64]) -> Vec<Stretch> {
+pub fn stretches(time_s: &[f64], position: &[f64], effort: &[f64]) -> Vec<Stretch> {
     let rows: Vec<[f64; 3]> = (0..time_s.len())
         .map(|row| [time_s[row], position[row], effort[row]])
         .filter(|row| row.iter().all(|value| value.is_finite()))
@@ -93,7 +97,7 @@ fn uniform(rows: &[[f64; 3]], usual_step_s: f64) -> Stretch {
     let is_usual = (0.5..2.0).contains(&(mean_step_s / usual_step_s));
     if is_usual && rows.iter().enumerate().all(on_grid) {
         let column = |index: usize| rows.iter().map(|row| row[index]).collect();
-        return Stretch { step_s: mean_step_s, position: column(1), effort: column(2) };
+        return Stretch { start_s: start, step_s: mean_step_s, position: column(1), effort: column(2) };
     }
     let count = ((end - start) / usual_step_s) as usize + 1;
     let (mut position, mut effort) = (Vec::with_capacity(count), Vec::with_capacity(count));
@@ -107,7 +111,7 @@ fn uniform(rows: &[[f64; 3]], usual_step_s: f64) -> Stretch {
         position.push(cubic(rows, left, time));
         effort.push(rows[left][2] + share * (rows[left + 1][2] - rows[left][2]));
     }
-    Stretch { step_s: usual_step_s, position, effort }
+    Stretch { start_s: start, step_s: usual_step_s, position, effort }
 }
 
 /// Position at a time between rows `left` and `left + 1`: a cubic whose slope at each row is between those of
@@ -231,9 +235,14 @@ fn mean_over_band(value: impl Fn(f64) -> f64) -> f64 {
 /// Variance of white noise in the position, from its fourth differences (variance 70 for white noise of 1),
 /// in which a motion that is slow against the sample rate has no part.
 fn noise_variance(stretches: &[Stretch]) -> f64 {
+    white_noise(stretches.iter().flat_map(|stretch| stretch.position.windows(5)))
+}
+
+/// Variance of white noise in windows of five samples of a signal that is slow against them.
+pub fn white_noise<'a>(windows: impl Iterator<Item = &'a [f64]>) -> f64 {
     let fourth = |w: &[f64]| w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4];
     let (mut sum, mut count) = (0.0, 0_usize);
-    for window in stretches.iter().flat_map(|stretch| stretch.position.windows(5)) {
+    for window in windows {
         sum += fourth(window).powi(2);
         count += 1;
     }

@@ -1,0 +1,89 @@
+//! `flqr refine`: what a model lacks, found in measured data and added.
+
+use std::io::{self, Write};
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+
+use clap::Args;
+use flqr_core::refine::{self, Refinement, Verdict};
+
+use super::output::{Failure, Output, complain, number};
+use super::progress::Progress;
+use super::residual::{Common, print_errors, print_health};
+use super::{file, input};
+
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// Model file (TOML)
+    model: PathBuf,
+    /// Logs (CSV) of one kind: of the robot, or of one motor or axis
+    #[arg(required = true)]
+    logs: Vec<PathBuf>,
+    /// Log that takes no part in the estimates and tells the error; repeatable [default: the last third of each log]
+    #[arg(long, value_name = "LOG")]
+    heldout: Vec<PathBuf>,
+    #[command(flatten)]
+    common: Common,
+    /// Write the refined model (TOML)
+    #[arg(long, value_name = "NEW.toml")]
+    out: Option<PathBuf>,
+    /// Write the report with its figures as one HTML file
+    #[arg(long, value_name = "OUT.html")]
+    report: Option<PathBuf>,
+}
+
+pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
+    let model = input::load_model(&arguments.model)?;
+    let logs = arguments.common.read(&arguments.logs)?;
+    let held_out = arguments.common.read(&arguments.heldout)?;
+    let bar = Progress::new("refine");
+    let found = refine::refine(&model, &logs, &held_out, &arguments.common.options(), &mut |share| {
+        bar.set((1000.0 * share) as u64, 1000);
+        ControlFlow::Continue(())
+    })
+    .map_err(Failure::from_error)?;
+    drop(bar);
+    if let Some(path) = &arguments.out {
+        file::write(path, "model", |out| out.write_all(found.model.to_toml().as_bytes()))?;
+        complain(&format!("the refined model is in {}", path.display()));
+    }
+    if let Some(path) = &arguments.report {
+        file::write(path, "report", |out| out.write_all(found.document.to_html().as_bytes()))?;
+        complain(&format!("the report with its figures is in {}", path.display()));
+    }
+    output.result(&found, |out| print(out, &found))
+}
+
+fn print(out: &mut dyn Write, found: &Refinement) -> io::Result<()> {
+    let verdict = match found.verdict {
+        Verdict::ModelAdequate => "model adequate: no effect of the library explains the log better",
+        Verdict::EffectsFound => "effects found",
+        Verdict::UnexplainedResidual => "unexplained residual: no effect of the library explains it",
+        Verdict::DataUnfit => "data unfit: the logs cannot answer",
+    };
+    writeln!(out, "{verdict}")?;
+    for effect in &found.effects {
+        writeln!(out, "\n{}, error lower by {:.1} %", effect.effect.id(), effect.error_drop_percent)?;
+        for (n, (key, value)) in effect.effect.parameters().iter().enumerate() {
+            write!(out, "  {key:24}{:>14}", number(*value))?;
+            match effect.ci95[n] {
+                Some([low, high]) => write!(out, "   {} to {}", number(low), number(high))?,
+                None => write!(out, "   ")?,
+            }
+            writeln!(out, " {}", if effect.units[n] == "1" { "" } else { effect.units[n] })?;
+        }
+        if !effect.ambiguous_with.is_empty() {
+            let others: Vec<&str> = effect.ambiguous_with.iter().map(|kind| kind.id).collect();
+            writeln!(out, "  not told from {} by this log", others.join(", "))?;
+        }
+    }
+    writeln!(out)?;
+    print_errors(out, &[("before", &found.before), ("after", &found.after)])?;
+    if !found.unexplained.description.is_empty() {
+        writeln!(out, "unexplained: {}", found.unexplained.description)?;
+    }
+    if let Some(next) = &found.next_experiment {
+        writeln!(out, "next experiment: {next}")?;
+    }
+    print_health(out, &found.data_health)
+}

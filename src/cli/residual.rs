@@ -1,0 +1,120 @@
+//! `flqr residual`: how far a model is from logs of its machine.
+
+use std::io::{self, Write};
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use flqr_core::record::{ColumnMap, HealthFinding, Log, Mapping};
+use flqr_core::refine::{self, Errors, Options, Residual};
+use flqr_core::robot::Motor;
+
+use super::input;
+use super::output::{Failure, Output, number};
+use super::progress::Progress;
+
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// Model file (TOML)
+    model: PathBuf,
+    /// Logs (CSV) of one kind: of the robot, or of one motor or axis
+    #[arg(required = true)]
+    logs: Vec<PathBuf>,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// What `residual` and `refine` share.
+#[derive(Args)]
+pub(crate) struct Common {
+    /// Motor of a robot model that a bench log belongs to
+    #[arg(long, value_enum, default_value = "left")]
+    motor: MotorName,
+    /// Parameters that are free, not only within their tolerances: `all`, or names as in the model file
+    #[arg(long, value_delimiter = ',', value_name = "NAME,...")]
+    estimate: Vec<String>,
+    /// A column of ours from one of the file's, as in torque_nm=current_a*0.32; repeatable
+    #[arg(long, value_name = "OURS=THEIRS[*FACTOR]")]
+    map: Vec<Mapping>,
+    /// Seed of everything that is drawn
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum MotorName {
+    Left,
+    Right,
+}
+
+impl Common {
+    pub(crate) fn options(&self) -> Options {
+        let motor = match self.motor {
+            MotorName::Left => Motor::Left,
+            MotorName::Right => Motor::Right,
+        };
+        Options { motor, estimate: self.estimate.clone(), seed: self.seed }
+    }
+
+    pub(crate) fn read(&self, paths: &[PathBuf]) -> Result<Vec<Log>, Failure> {
+        let map = ColumnMap::new(self.map.clone()).map_err(Failure::from_error)?;
+        paths.iter().map(|path| input::read_log(path, &map)).collect()
+    }
+}
+
+pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
+    let model = input::load_model(&arguments.model)?;
+    let logs = arguments.common.read(&arguments.logs)?;
+    let bar = Progress::new("residual");
+    let found = refine::residual(&model, &logs, &arguments.common.options(), &mut |share| {
+        bar.set((1000.0 * share) as u64, 1000);
+        ControlFlow::Continue(())
+    })
+    .map_err(Failure::from_error)?;
+    drop(bar);
+    output.result(&found, |out| print(out, &found))
+}
+
+fn print(out: &mut dyn Write, found: &Residual) -> io::Result<()> {
+    print_errors(out, &[("", &found.errors)])?;
+    for test in &found.tests {
+        let verdict = if test.structure { "structure" } else { "none" };
+        writeln!(out, "{:45}{:>14}   {verdict} (above {})", test.name, number(test.value), test.threshold)?;
+    }
+    print_health(out, &found.data_health)
+}
+
+/// One kind of error.
+type Kind = fn(&Errors) -> &refine::Channels;
+
+/// A line for each channel, with a column for each of the errors.
+pub(crate) fn print_errors(out: &mut dyn Write, errors: &[(&str, &Errors)]) -> io::Result<()> {
+    if errors.iter().any(|(title, _)| !title.is_empty()) {
+        let titles: String = errors.iter().map(|(title, _)| format!("{title:>14}")).collect();
+        writeln!(out, "{:45}{titles}", "held-out rows")?;
+    }
+    let kinds: [(&str, Kind); 3] = [
+        ("residual", |errors| &errors.rmse),
+        ("noise of the sensors alone", |errors| &errors.noise_floor),
+        ("residual by the torque or force itself", |errors| &errors.nrmse),
+    ];
+    for (title, kind) in kinds {
+        let Some((_, first)) = errors.first() else { return Ok(()) };
+        for (index, (channel, quantity)) in kind(first).0.iter().enumerate() {
+            write!(out, "{:45}", format!("{title}, {channel}"))?;
+            for (_, errors) in errors {
+                write!(
+                    out,
+                    "{:>14}",
+                    kind(errors).0.get(index).map_or(String::new(), |(_, q)| number(q.value))
+                )?;
+            }
+            writeln!(out, " {}", if quantity.unit == "1" { "" } else { quantity.unit })?;
+        }
+    }
+    Ok(())
+}
+
+pub(crate) fn print_health(out: &mut dyn Write, findings: &[HealthFinding]) -> io::Result<()> {
+    findings.iter().try_for_each(|finding| writeln!(out, "{finding}"))
+}

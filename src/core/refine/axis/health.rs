@@ -1,0 +1,214 @@
+//! What makes a log unfit to refine an axis with, said before any effect is named.
+
+use crate::record::{self, HealthFinding, Log, Severity};
+use crate::refine::select::{Blocks, Member};
+
+use super::rig::{Declared, Nuisance};
+use super::trace::{Part, Rows};
+
+/// Fewest rows in a second at which friction and harmonics of a motor's loop are seen.
+const SLOWEST_HZ: f64 = 45.0;
+/// A measured effort between these shares of the wanted one has the right unit.
+const RIGHT_UNIT: [f64; 2] = [0.5, 2.0];
+/// Share of the effort that the declared model must explain, whatever its factor, before that factor is believed.
+const COHERENT: f64 = 0.6;
+/// The same where the column of the speed is off by that factor too.
+const COHERENT_WITH_GEAR: f64 = 0.3;
+/// Share of rows at a limit above which an effort is cut off.
+const CUT_OFF: f64 = 0.2;
+/// Runs of equal values that are usual, from which on a column is held.
+const HELD_ROWS: usize = 3;
+
+fn finding(severity: Severity, column: &str, problem: String, mend: impl Into<String>) -> HealthFinding {
+    HealthFinding { severity, column: column.to_owned(), problem, mend: mend.into() }
+}
+
+/// Findings about the logs.
+pub(super) fn check(logs: &[Log], declared: &Declared) -> Vec<HealthFinding> {
+    let mut found: Vec<HealthFinding> = logs.iter().flat_map(record::data_health).collect();
+    let names = declared.names();
+    for log in logs {
+        let column = |name: &str| log.column(name).unwrap_or_default();
+        if let Some(row_s) = record::row_time_s(column("time_s"))
+            && 1.0 / row_s < SLOWEST_HZ
+        {
+            found.push(finding(
+                Severity::Error,
+                "time_s",
+                format!("{:.1} rows a second are too few to see what moves a motor", 1.0 / row_s),
+                "record 50 rows a second or more, better as many as the loop has",
+            ));
+        }
+        for name in [names.position, names.effort] {
+            let values = column(name);
+            if values.windows(2).all(|pair| pair[0] == pair[1] || pair.iter().any(|value| value.is_nan())) {
+                found.push(finding(
+                    Severity::Error,
+                    name,
+                    "the value does not change".to_owned(),
+                    "check that the sensor is connected, or record the axis while it moves",
+                ));
+            }
+            let held = usual_run(values);
+            if held >= HELD_ROWS && name == names.position {
+                found.push(finding(
+                    Severity::Warning,
+                    name,
+                    format!("each value is held for {held} rows: the motion in between is not known"),
+                    "record only fresh values, or at the sensor's own rate",
+                ));
+            }
+        }
+        let efforts = column(names.effort);
+        let share = share_at_limits(efforts);
+        if share > CUT_OFF {
+            found.push(finding(
+                Severity::Error,
+                names.effort,
+                format!(
+                    "{:.0} % of the rows are at the largest or smallest value: it is cut off there",
+                    100.0 * share
+                ),
+                "record the torque that really acts, or a motion that needs less",
+            ));
+        }
+    }
+    found
+}
+
+/// The finding that the motion does not tell the parameters apart.
+pub(super) fn inseparable(declared: &Declared) -> HealthFinding {
+    finding(
+        Severity::Error,
+        declared.names().position,
+        "the motion does not tell the model's parameters apart".to_owned(),
+        "record motion at several speeds in both directions, or free fewer parameters",
+    )
+}
+
+/// Rows for which a value usually stays before it changes.
+fn usual_run(values: &[f64]) -> usize {
+    let mut runs: Vec<usize> = values.chunk_by(|a, b| a == b).map(<[f64]>::len).collect();
+    if runs.len() < 10 {
+        return 1;
+    }
+    let middle = runs.len() / 2;
+    *runs.select_nth_unstable(middle).1
+}
+
+/// Share of rows in runs at the largest and smallest value.
+fn share_at_limits(values: &[f64]) -> f64 {
+    let range =
+        values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &v| [low.min(v), high.max(v)]);
+    let flat = values.chunk_by(|a, b| a == b).filter(|run| run.len() > 2 && range.contains(&run[0]));
+    flat.map(<[f64]>::len).sum::<usize>() as f64 / values.len().max(1) as f64
+}
+
+/// Findings about the rows that are left, and about the column of the speed.
+pub(super) fn check_rows(
+    rows: &Rows,
+    declared: &Declared,
+    fitted: usize,
+    needed: usize,
+) -> Vec<HealthFinding> {
+    let (names, mut found) = (declared.names(), Vec::new());
+    if fitted < needed {
+        let problem = format!(
+            "{fitted} rows in motion are left to fit after filtering at {:.0} Hz, and {needed} are needed; {:.0} % of \
+             the time the axis rests",
+            rows.kernel.cutoff_hz,
+            100.0 * rows.rest_share
+        );
+        let mend = "record at least ten seconds of motion in both directions";
+        found.push(finding(Severity::Error, names.position, problem, mend));
+    } else if !rows.moves() {
+        let problem = "the axis hardly moves: what there is may be noise of the position".to_owned();
+        let mend = "record motion at several speeds in both directions";
+        found.push(finding(Severity::Error, names.position, problem, mend));
+    }
+    if let Some(speed) = rows.agreement.filter(|agreement| agreement.incoherent < 0.5) {
+        let map = |factor: f64| format!("read it with --map {0}={0}*{factor:.4}", names.speed);
+        if (speed.factor - 1.0).abs() > 0.05 {
+            let problem = format!(
+                "the change of `{}` is {:.3} times this speed: they do not agree",
+                names.position, speed.factor
+            );
+            found.push(finding(Severity::Warning, names.speed, problem, map(speed.factor)));
+        } else if speed.lag_s > 0.75 * rows.kernel.step_s {
+            let problem = format!(
+                "the speed is {:.1} ms later than `{}` changes: a filter of the driver",
+                1e3 * speed.lag_s,
+                names.position
+            );
+            let mend = "nothing has to be done: the speed is taken from the position";
+            found.push(finding(Severity::Warning, names.speed, problem, mend));
+        }
+    }
+    found
+}
+
+/// Whether the measured effort can be what the declared model says it is.
+pub(super) fn check_effort(
+    rows: &Rows,
+    declared: &Declared,
+    nuisances: &[Nuisance],
+    measured: &[f64],
+    target: &[f64],
+) -> Vec<HealthFinding> {
+    let effort = declared.names().effort;
+    let fitted: Vec<usize> = (0..rows.rows.len()).filter(|&row| rows.rows[row].part == Part::Fit).collect();
+    if fitted.is_empty() {
+        return Vec::new();
+    }
+    let at = |column: &dyn Fn(usize) -> f64| -> Vec<f64> { fitted.iter().map(|&row| column(row)).collect() };
+    // What the model says without the numbers that are free.
+    let known = |row: usize| {
+        let free = nuisances.iter().filter(|nuisance| nuisance.free && !nuisance.is_logarithmic());
+        measured[row]
+            - target[row]
+            - free.map(|nuisance| nuisance.declared * nuisance.column[row]).sum::<f64>()
+    };
+    let mut columns = vec![at(&known)];
+    columns.extend(nuisances.iter().filter(|n| n.free).map(|nuisance| at(&|row| nuisance.column[row])));
+    let views: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+    let blocks = Blocks::new(&views, &at(&|row| measured[row]), &vec![0; fitted.len()]);
+    let members: Vec<Member> = (0..columns.len()).map(Member::free).collect();
+    let (Some(found), Some(own)) =
+        (blocks.fit(&members, 0.0), blocks.power_beyond(&members[1..], 0.0, &[(0, 1.0)]))
+    else {
+        return Vec::new();
+    };
+    let left = blocks.left(&members, &found);
+    let factor = found[0];
+    // Of the effort, what the known part explains and what nothing does.
+    let explained = factor * factor * own;
+    let gear = rows
+        .agreement
+        .map(|speed| speed.factor)
+        .filter(|speed| (speed * factor.abs()).ln().abs() < 0.3 || (speed / factor.abs()).ln().abs() < 0.3)
+        .filter(|speed| !(RIGHT_UNIT[0]..=RIGHT_UNIT[1]).contains(speed));
+    let needed = if gear.is_some() { COHERENT_WITH_GEAR } else { COHERENT };
+    if explained < needed * (explained + left) || explained < needed * 0.5 * blocks.target_power() {
+        return Vec::new();
+    }
+    if factor < 0.0 {
+        let problem = "the effort acts against what the declared model wants: its sign is turned".to_owned();
+        let mend = format!("turn the sign with --map {effort}={effort}*-1");
+        return vec![finding(Severity::Error, effort, problem, mend)];
+    }
+    if (RIGHT_UNIT[0]..=RIGHT_UNIT[1]).contains(&factor) {
+        return Vec::new();
+    }
+    let cause = match gear {
+        Some(gear) => format!(
+            "a gear lies between, as the column of the speed, off by a factor of {gear:.3}, shows too"
+        ),
+        None => "it is measured before a gear, or in another unit".to_owned(),
+    };
+    let problem = format!(
+        "the effort is {factor:.3} times what the declared model wants, so it cannot be the one that acts on the axis: {cause}"
+    );
+    let mend =
+        format!("read it with --map {effort}={effort}*{:.4}, or with the gear's own ratio", 1.0 / factor);
+    vec![finding(Severity::Error, effort, problem, mend)]
+}

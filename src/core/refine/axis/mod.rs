@@ -1,0 +1,353 @@
+//! A single motor or a linear axis: its equation error, and what its model lacks.
+
+mod candidates;
+mod errors;
+mod health;
+mod leftover;
+mod rig;
+mod search;
+mod trace;
+mod waves;
+
+use std::ops::ControlFlow;
+
+use crate::effects::{self, Effect, MachineKind, Role};
+use crate::identify::quantile::student_t_975;
+use crate::model_file::{Model, Rig};
+use crate::record::{HealthFinding, Log};
+use crate::robot::Motor;
+
+use super::error::RefineError;
+use super::verdict::{Corrected, Errors, Found, Refinement, Residual, Unexplained, Verdict};
+use super::{Options, pages};
+use candidates::{Scales, library};
+use errors::errors;
+use leftover::{Dependence, Variable};
+use rig::{Declared, Nuisance};
+use search::{Fit, Search, White};
+use trace::Rows;
+
+/// Share of the gain of effects above which what is left shows that they are not the right ones.
+const MISNAMED: f64 = 0.35;
+/// Share of what is left that one variable explains, above which the names are wrong whatever they explain.
+const NEARLY_ALL: f64 = 0.8;
+/// The same for the speed, where all effects are functions of the speed.
+const STILL_OVER_SPEED: f64 = 0.2;
+const OF_SPEED: [&str; 5] =
+    ["quadratic_drag", "viscous_asymmetry", "viscous_error", "coulomb_error", "low_speed_friction"];
+/// How many times less a function of one variable leaves than effects that are not the right ones.
+const BETTER: f64 = 2.5;
+/// Fewest rows that are fitted.
+const LEAST_ROWS: usize = 200;
+
+/// How far the declared model is from logs.
+pub(super) fn residual(
+    model: &Model,
+    logs: &[Log],
+    options: &Options,
+    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> Result<Residual, RefineError> {
+    let declared = Declared::new(model, options.motor);
+    let mut data_health = health::check(logs, &declared);
+    // Nothing is fitted, so that every row counts.
+    let rows = Rows::new(logs, logs, declared.names());
+    let [measured, target] = declared.targets(&rows);
+    let nuisances = declared.nuisances(&rows, &options.estimate)?;
+    data_health.extend(health::check_effort(&rows, &declared, &nuisances, &measured, &target));
+    report(watch, 0.5)?;
+    let whitener = search::whitener(&rows, declared.inertia);
+    let mut tests = Vec::new();
+    if whitener.rows().len() >= LEAST_ROWS {
+        let white = White::new(&rows, &whitener, &nuisances, [&measured, &target], declared.inertia);
+        let search = Search::new(&rows, &declared.machine, &nuisances, &target, (&whitener, &white, &[]));
+        let wanted: Vec<f64> = measured.iter().zip(&target).map(|(measured, left)| measured - left).collect();
+        tests.extend(search.leftover(&wanted).unwrap_or_default().iter().map(|found| found.test(&declared)));
+    }
+    Ok(Residual { errors: errors(&declared, &rows, &measured, &target), tests, data_health })
+}
+
+fn report(watch: &mut dyn FnMut(f64) -> ControlFlow<()>, share: f64) -> Result<(), RefineError> {
+    if watch(share).is_break() { Err(RefineError::Cancelled) } else { Ok(()) }
+}
+
+/// Finds what the model lacks.
+pub(super) fn refine(
+    model: &Model,
+    logs: &[Log],
+    held_out: &[Log],
+    options: &Options,
+    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> Result<Refinement, RefineError> {
+    let declared = Declared::new(model, options.motor);
+    let mut data_health = health::check(logs, &declared);
+    let rows = Rows::new(logs, held_out, declared.names());
+    let fitted = rows.rows.iter().filter(|row| row.part == trace::Part::Fit).count();
+    data_health.extend(health::check_rows(&rows, &declared, fitted, LEAST_ROWS));
+    let [measured, target] = declared.targets(&rows);
+    let nuisances = declared.nuisances(&rows, &options.estimate)?;
+    data_health.extend(health::check_effort(&rows, &declared, &nuisances, &measured, &target));
+    data_health.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
+    let unfit = data_health.iter().any(|finding| finding.severity == crate::record::Severity::Error);
+    if unfit {
+        return Ok(unfit_refinement(model, data_health));
+    }
+    let whitener = search::whitener(&rows, declared.inertia);
+    let white = White::new(&rows, &whitener, &nuisances, [&measured, &target], declared.inertia);
+    let wanted: Vec<f64> = measured.iter().zip(&target).map(|(measured, left)| measured - left).collect();
+    let scales = Scales::new(&rows, declared.inertia);
+    let library = library(&declared.machine, &rows, &whitener, &scales, (&wanted, declared.inertia));
+    let mut search =
+        Search::new(&rows, &declared.machine, &nuisances, &target, (&whitener, &white, &library));
+    let Some(first) = search.fit(&[]) else {
+        data_health.push(health::inseparable(&declared));
+        return Ok(unfit_refinement(model, data_health));
+    };
+    let before_left = search.residual(&first.judged.coefficients);
+    let before = errors(&declared, &rows, &measured, &before_left);
+    let first_error = first.judged.error() / first.blocks.rows() as f64;
+    let before_structure = search.leftover(&wanted).unwrap_or_default();
+    report(watch, 0.2)?;
+    search.run(watch)?;
+    report(watch, 0.8)?;
+    let mut structure = search.leftover(&wanted).unwrap_or_default();
+    structure.retain(Dependence::shows);
+    let fit = search.fit(&[]).unwrap_or(first);
+    let left = search.residual(&fit.judged.coefficients);
+    let after = errors(&declared, &rows, &measured, &left);
+    let effects = found_effects(&search, &fit, &declared, &rows, &measured);
+    let corrections = corrections(&nuisances, &fit);
+    let wrong = !effects.is_empty() && misnamed(first_error, &before_structure, &fit, &structure, &effects);
+    let effects = if wrong { Vec::new() } else { effects };
+    let structure = if wrong && structure.is_empty() {
+        before_structure.into_iter().filter(Dependence::shows).collect()
+    } else {
+        structure
+    };
+    let verdict = match (effects.is_empty(), structure.is_empty() && !wrong) {
+        (false, _) => Verdict::EffectsFound,
+        (true, false) => Verdict::UnexplainedResidual,
+        (true, true) => Verdict::ModelAdequate,
+    };
+    let values: Vec<(&'static str, f64)> = corrections.iter().map(|c| (c.key, c.value)).collect();
+    let next_experiment = next_experiment(&effects);
+    let mut refinement = Refinement {
+        verdict,
+        model: refined_model(
+            declared.corrected_model(model, options.motor, &values),
+            options.motor,
+            &effects,
+        ),
+        effects,
+        before,
+        after,
+        unexplained: unexplained(&declared, &structure),
+        next_experiment,
+        data_health,
+        parameters: corrections,
+        document: Default::default(),
+    };
+    let figures = figures(&declared, &rows, &before_left, &left);
+    refinement.document = pages::document(&refinement, logs, &figures, declared.words());
+    Ok(refinement)
+}
+
+/// The model with effects: those that are errors of its numbers put right there, the others added.
+fn refined_model(mut model: Model, motor: Motor, effects: &[Found]) -> Model {
+    for found in effects {
+        match &mut model.rig {
+            Rig::Axis(axis) => {
+                if !found.effect.declare_in(effects::Declared::Axis(axis)) {
+                    axis.effects.push(found.effect.clone());
+                }
+            }
+            Rig::Robot(robot) => {
+                let parameters = found.effect.parameters().iter().map(|(key, value)| (key.as_str(), *value));
+                let own = found.effect.kind().per_motor().then_some(motor);
+                // What a bench shows of a wheel in the air is in the same units on the robot.
+                if let Ok(effect) = Effect::new(found.effect.id(), MachineKind::Robot, own, parameters)
+                    && !effect.declare_in(effects::Declared::Robot(robot))
+                {
+                    robot.effects.push(effect);
+                }
+            }
+        }
+    }
+    model
+}
+
+/// The residual at the held-out rows, as pictures take it.
+fn figures(declared: &Declared, rows: &Rows, before: &[f64], after: &[f64]) -> pages::Figures {
+    let mut figures = pages::Figures::default();
+    for (index, row) in rows.rows.iter().enumerate().filter(|(_, row)| row.part == trace::Part::HeldOut) {
+        let trace = &rows.traces[row.trace];
+        let position = trace.position[row.sample];
+        figures.time_s.push(row.time_s);
+        figures.position.push(if declared.is_linear() {
+            position
+        } else {
+            position.rem_euclid(std::f64::consts::TAU)
+        });
+        figures.speed.push(trace.speed[row.sample]);
+        figures.before.push(before[index]);
+        figures.after.push(after[index]);
+    }
+    figures
+}
+
+/// Whether a smooth function of one variable explains the residual so much better than the effects do that their names
+/// are wrong.
+fn misnamed(
+    first_error: f64,
+    before: &[Dependence],
+    fit: &Fit,
+    after: &[Dependence],
+    effects: &[Found],
+) -> bool {
+    let error = fit.judged.error() / fit.blocks.rows() as f64;
+    let explained = first_error - error;
+    let best = before.iter().filter(|found| found.shows()).map(|found| found.gain).fold(0.0, f64::max);
+    let shown = || after.iter().filter(|found| found.shows());
+    let more = shown().map(|found| found.gain).fold(0.0, f64::max);
+    let over_speed = shown().any(|found| found.variable == Variable::Speed && found.gain > STILL_OVER_SPEED);
+    if more > NEARLY_ALL || (over_speed && effects.iter().all(|found| OF_SPEED.contains(&found.effect.id())))
+    {
+        return true;
+    }
+    let rest = error / first_error;
+    (best > 0.3 && rest > BETTER * (1.0 - best)) || more * error > MISNAMED * explained
+}
+
+fn unfit_refinement(model: &Model, data_health: Vec<HealthFinding>) -> Refinement {
+    Refinement {
+        verdict: Verdict::DataUnfit,
+        effects: Vec::new(),
+        before: Errors::default(),
+        after: Errors::default(),
+        unexplained: Unexplained::default(),
+        next_experiment: data_health.first().map(|finding| finding.mend.clone()),
+        data_health,
+        parameters: Vec::new(),
+        model: model.clone(),
+        document: Default::default(),
+    }
+}
+
+fn unexplained(declared: &Declared, structure: &[Dependence]) -> Unexplained {
+    let mut depends_on: Vec<String> = Vec::new();
+    let mut shares = Vec::new();
+    for found in structure {
+        let name = found.variable.name(declared);
+        if !depends_on.iter().any(|other| other == name) {
+            depends_on.push(name.to_owned());
+            shares.push(found.gain);
+        }
+    }
+    let description = match depends_on.first() {
+        Some(first) => format!("{first} still explains {:.1} % of the residual", 100.0 * shares[0]),
+        None => String::new(),
+    };
+    Unexplained { depends_on, shares, description }
+}
+
+fn corrections(nuisances: &[Nuisance], fit: &Fit) -> Vec<Corrected> {
+    let t = student_t_975(fit.blocks.count().max(2) - 1);
+    let corrected = |(index, nuisance): (usize, &Nuisance)| {
+        let change = fit.judged.coefficients[index];
+        let width = t * fit.judged.standard_error(index);
+        Corrected {
+            key: nuisance.key,
+            declared: nuisance.declared,
+            value: nuisance.corrected(change),
+            ci95: Some([nuisance.corrected(change - width), nuisance.corrected(change + width)]),
+        }
+    };
+    nuisances.iter().enumerate().filter(|(_, nuisance)| !nuisance.key.is_empty()).map(corrected).collect()
+}
+
+fn next_experiment(effects: &[Found]) -> Option<String> {
+    let ambiguous = effects.iter().find(|found| !found.ambiguous_with.is_empty())?;
+    Some(format!(
+        "to tell {} from {}: {}",
+        ambiguous.effect.id(),
+        ambiguous.ambiguous_with.iter().map(|kind| kind.id).collect::<Vec<_>>().join(", "),
+        ambiguous.effect.kind().separated_by
+    ))
+}
+
+/// Picks of one kind are one effect, the strongest harmonics first.
+fn found_effects(
+    search: &Search<'_>,
+    fit: &Fit,
+    declared: &Declared,
+    rows: &Rows,
+    measured: &[f64],
+) -> Vec<Found> {
+    let t = student_t_975(fit.blocks.count().max(2) - 1);
+    let mut first = search.nuisances.len();
+    let mut firsts = Vec::new();
+    for pick in &search.picks {
+        firsts.push(first);
+        first += pick.columns.len();
+    }
+    let all = search.residual(&fit.judged.coefficients);
+    let error = |left: &[f64]| errors(declared, rows, measured, left).rmse.main();
+    let mut found: Vec<Found> = Vec::new();
+    for (index, pick) in search.picks.iter().enumerate() {
+        if found.iter().any(|found| found.effect.kind() == pick.kind) {
+            continue;
+        }
+        let mut members: Vec<usize> =
+            (index..search.picks.len()).filter(|&i| search.picks[i].kind == pick.kind).collect();
+        let size = |i: usize| -> f64 {
+            (0..search.picks[i].columns.len()).map(|n| fit.judged.coefficients[firsts[i] + n].powi(2)).sum()
+        };
+        members.sort_by(|&a, &b| size(b).total_cmp(&size(a)));
+        let shape: Vec<f64> = members.iter().flat_map(|&i| search.picks[i].shape.clone()).collect();
+        let columns: Vec<usize> =
+            members.iter().flat_map(|&i| firsts[i]..firsts[i] + search.picks[i].columns.len()).collect();
+        let amplitudes: Vec<f64> = if pick.fixed {
+            Vec::new()
+        } else {
+            columns.iter().map(|&column| pick.amplitude(fit.judged.coefficients[column])).collect()
+        };
+        let Ok(effect) = Effect::estimated(pick.kind, declared.machine.kind, None, &shape, &amplitudes)
+        else {
+            continue;
+        };
+        let shape_widths = search.shape_errors(fit, &members);
+        let (mut shape_widths, mut widths) =
+            (shape_widths.into_iter(), columns.iter().map(|&column| fit.judged.standard_error(column)));
+        let parameters = pick.kind.parameters;
+        let ci95 = effect
+            .parameters()
+            .iter()
+            .enumerate()
+            .map(|(n, (_, value))| {
+                let parameter = &parameters[n % parameters.len()];
+                let whole = parameter.whole && !declared.is_linear();
+                let width = match parameter.role {
+                    Role::Shape => shape_widths.next().flatten(),
+                    Role::Amplitude => widths.next(),
+                };
+                width.filter(|_| !whole).map(|width| [value - t * width, value + t * width])
+            })
+            .collect();
+        let units = (0..effect.parameters().len())
+            .map(|n| parameters[n % parameters.len()].unit(declared.machine.kind))
+            .collect();
+        let drop = 1.0 - error(&all) / search.error_without(&members, &error).unwrap_or(f64::NAN);
+        let mut ambiguous_with = Vec::new();
+        for &member in &members {
+            for kind in search.ambiguous_with(member, fit) {
+                if !ambiguous_with.contains(&kind) {
+                    ambiguous_with.push(kind);
+                }
+            }
+        }
+        found.push(Found { effect, ci95, units, error_drop_percent: 100.0 * drop, ambiguous_with });
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,372 @@
+//! What a model declares of one axis.
+
+use crate::effects::{Effect, Machine, MachineKind, Place};
+use crate::friction::{Stribeck, StribeckParameters};
+use crate::model_file::{AxisParameters, Model, Rig};
+use crate::refine::error::RefineError;
+use crate::refine::pages::Words;
+use crate::robot::Motor;
+
+use super::trace::{Names, Rows, Trace};
+use crate::refine::select::Member;
+
+/// Tolerances of declared numbers, as shares.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Tolerances {
+    pub(super) mass: f64,
+    pub(super) length: f64,
+    pub(super) inertia: f64,
+    pub(super) friction: f64,
+}
+
+impl Default for Tolerances {
+    fn default() -> Self {
+        Self { mass: 0.02, length: 0.01, inertia: 0.05, friction: 0.1 }
+    }
+}
+
+/// Share of the Coulomb level that an offset may be off by, beside its own tolerance.
+const OFFSET_OF_COULOMB: f64 = 0.01;
+/// How far a free inertia may be from the declared one, as a share of it.
+const FREE_INERTIA: [f64; 2] = [-0.7, 9.0];
+/// A sampled torque may act anywhere between its own row and the next.
+const TIMING_ROWS: f64 = 0.5;
+
+/// The declared axis.
+#[derive(Clone, Debug)]
+pub(super) struct Declared {
+    pub(super) machine: Machine,
+    pub(super) inertia: f64,
+    pub(super) gravity: f64,
+    pub(super) friction: Option<StribeckParameters>,
+    pub(super) effects: Vec<Effect>,
+    pub(super) tolerances: Tolerances,
+}
+
+/// A declared number that is estimated along.
+pub(super) struct Nuisance {
+    /// Key as in the model file; empty for the timing of the torque, which no model holds.
+    pub(super) key: &'static str,
+    pub(super) declared: f64,
+    /// What an estimate adds to it; of the Stribeck speed and exponent the logarithm.
+    pub(super) column: Vec<f64>,
+    pub(super) tolerance: f64,
+    pub(super) free: bool,
+    /// The effect that says the same without a tolerance.
+    pub(super) effect: &'static str,
+}
+
+impl Nuisance {
+    pub(super) fn member(&self, column: usize) -> Member {
+        match (self.free, self.effect) {
+            (false, _) => Member::within(column, self.tolerance),
+            // An axis without inertia would take the torque for its own explanation.
+            (true, "inertia_error") => {
+                Member { bounds: FREE_INERTIA.map(|share| share * self.declared), ..Member::free(column) }
+            }
+            // Friction takes power, it never gives any.
+            (true, "viscous_error" | "coulomb_error") => {
+                Member { bounds: [-self.declared, f64::INFINITY], ..Member::free(column) }
+            }
+            (true, _) => Member::free(column),
+        }
+    }
+
+    /// The corrected number.
+    pub(super) fn corrected(&self, change: f64) -> f64 {
+        if self.is_logarithmic() { self.declared * change.exp() } else { self.declared + change }
+    }
+
+    pub(super) fn is_logarithmic(&self) -> bool {
+        self.key.starts_with("stribeck")
+    }
+}
+
+impl Declared {
+    /// One motor of a robot with its wheel in the air, or the axis of a model.
+    pub(super) fn new(model: &Model, motor: Motor) -> Self {
+        let (machine, inertia, gravity, friction, effects) = match &model.rig {
+            Rig::Robot(robot) => (
+                Machine::wheel_in_air(robot),
+                robot.parameters.wheel_inertia_kg_m2,
+                0.0,
+                robot.friction[motor as usize],
+                robot.effects.iter().filter(|effect| effect.is_in(motor)).cloned().collect(),
+            ),
+            Rig::Axis(axis) => {
+                let (inertia, gravity, friction) = match axis.parameters {
+                    AxisParameters::Rotary { inertia_kg_m2, gravity_torque_nm, friction } => {
+                        (inertia_kg_m2, gravity_torque_nm, friction)
+                    }
+                    AxisParameters::Linear { mass_kg, friction } => (mass_kg, 0.0, friction),
+                };
+                (Machine::axis(axis), inertia, gravity, friction, axis.effects.clone())
+            }
+        };
+        Self {
+            machine,
+            inertia,
+            gravity,
+            friction: friction.map(|curve| *curve.parameters()),
+            effects,
+            tolerances: Tolerances::default(),
+        }
+    }
+
+    pub(super) fn is_linear(&self) -> bool {
+        self.machine.kind == MachineKind::Linear
+    }
+
+    pub(super) fn names(&self) -> Names {
+        if self.is_linear() {
+            Names { position: "position_m", speed: "velocity_m_s", effort: "force_n" }
+        } else {
+            Names { position: "motor_angle_rad", speed: "motor_speed_rad_s", effort: "torque_nm" }
+        }
+    }
+
+    /// How a report names things.
+    pub(super) fn words(&self) -> Words {
+        if self.is_linear() {
+            Words { effort: "Force", effort_unit: "N", position: ("Position", "m"), speed: ("Speed", "m/s") }
+        } else {
+            Words {
+                effort: "Torque",
+                effort_unit: "N m",
+                position: ("Angle in a turn", "rad"),
+                speed: ("Speed", "rad/s"),
+            }
+        }
+    }
+
+    pub(super) fn channel(&self) -> &'static str {
+        if self.is_linear() { "force" } else { "torque" }
+    }
+
+    pub(super) fn effort_unit(&self) -> &'static str {
+        if self.is_linear() { "N" } else { "N m" }
+    }
+
+    fn curve(&self) -> StribeckParameters {
+        self.friction.unwrap_or(StribeckParameters {
+            coulomb_nm: 0.0,
+            static_nm: 0.0,
+            viscous_nm_s_rad: 0.0,
+            stribeck_speed_rad_s: 1.0,
+            stribeck_exponent: 1.0,
+            offset_nm: 0.0,
+        })
+    }
+
+    /// Efforts at the rows: measured, and measured less what the declared numbers explain.
+    pub(super) fn targets(&self, rows: &Rows) -> [Vec<f64>; 2] {
+        let measured = rows.column(torque_between);
+        let curve = Stribeck::new(self.curve()).expect("the model's curve was checked when it was loaded");
+        let declared = rows.column(|trace| {
+            let acceleration = trace.second_difference();
+            (0..trace.position.len())
+                .map(|sample| {
+                    self.inertia * acceleration[sample]
+                        + curve.torque_nm(trace.speed[sample])
+                        + self.gravity * libm::sin(trace.position[sample])
+                })
+                .collect()
+        });
+        let mut target: Vec<f64> = measured.iter().zip(&declared).map(|(a, b)| a - b).collect();
+        for effect in &self.effects {
+            let known = rows.law_column(&effect.law(&self.machine), effect.kind().place == Place::Actuator);
+            target.iter_mut().zip(&known).for_each(|(target, known)| *target -= known);
+        }
+        [measured, target]
+    }
+
+    /// Everything that is estimated along.
+    ///
+    /// # Errors
+    /// A name in `estimate` that is none.
+    pub(super) fn nuisances(&self, rows: &Rows, estimate: &[String]) -> Result<Vec<Nuisance>, RefineError> {
+        let curve = self.curve();
+        let keys = if self.is_linear() { LINEAR_KEYS } else { ROTARY_KEYS };
+        if let Some(name) = estimate.iter().find(|name| *name != "all" && !keys.contains(&name.as_str())) {
+            let allowed = keys.iter().filter(|key| !key.is_empty()).copied().collect::<Vec<_>>().join(", ");
+            return Err(RefineError::UnknownParameter { name: name.clone(), allowed });
+        }
+        let all = estimate.iter().any(|name| name == "all");
+        let free = |index: usize| (all && index <= OFFSET) || estimate.iter().any(|name| name == keys[index]);
+        let t = self.tolerances;
+        let mut found = Vec::new();
+        let mut add = |index: usize, declared: f64, tolerance: f64, effect, column: Vec<f64>| {
+            if free(index) || tolerance > 0.0 {
+                found.push(Nuisance {
+                    key: keys[index],
+                    declared,
+                    column,
+                    tolerance,
+                    free: free(index),
+                    effect,
+                });
+            }
+        };
+        add(
+            INERTIA,
+            self.inertia,
+            self.inertia * if self.is_linear() { t.mass } else { t.inertia },
+            "inertia_error",
+            rows.column(Trace::second_difference),
+        );
+        add(
+            VISCOUS,
+            curve.viscous_nm_s_rad,
+            t.friction * curve.viscous_nm_s_rad,
+            "viscous_error",
+            rows.column(|trace| trace.speed.clone()),
+        );
+        let stribeck = curve.static_nm != curve.coulomb_nm;
+        let fading =
+            |speed: f64, scale: f64, exponent: f64| libm::exp(-libm::pow(speed.abs() / scale, exponent));
+        let fade = |speed: f64| {
+            if stribeck { fading(speed, curve.stribeck_speed_rad_s, curve.stribeck_exponent) } else { 0.0 }
+        };
+        let each = |value: &dyn Fn(f64) -> f64| {
+            rows.column(|trace| trace.speed.iter().map(|&speed| direction(speed) * value(speed)).collect())
+        };
+        add(
+            COULOMB,
+            curve.coulomb_nm,
+            t.friction * curve.coulomb_nm,
+            "coulomb_error",
+            each(&|speed| 1.0 - fade(speed)),
+        );
+        if stribeck {
+            add(STATIC, curve.static_nm, t.friction * curve.static_nm, "", each(&fade));
+            let drop = curve.static_nm - curve.coulomb_nm;
+            const STEP: f64 = 1e-3;
+            let slope = |step_scale: f64, step_exponent: f64| {
+                let at = |side: f64| {
+                    let scale = curve.stribeck_speed_rad_s * (side * step_scale).exp();
+                    let exponent = curve.stribeck_exponent * (side * step_exponent).exp();
+                    move |speed: f64| fading(speed, scale, exponent)
+                };
+                let (up, down) = (at(1.0), at(-1.0));
+                each(&|speed| drop * (up(speed) - down(speed)) / (2.0 * STEP))
+            };
+            add(STRIBECK_SPEED, curve.stribeck_speed_rad_s, t.friction, "", slope(STEP, 0.0));
+            add(STRIBECK_EXPONENT, curve.stribeck_exponent, t.friction, "", slope(0.0, STEP));
+        }
+        let offset = t.friction * curve.offset_nm.abs() + OFFSET_OF_COULOMB * curve.coulomb_nm;
+        add(
+            OFFSET,
+            curve.offset_nm,
+            offset,
+            "friction_asymmetry",
+            rows.column(|trace| vec![1.0; trace.position.len()]),
+        );
+        let gravity = self.gravity.abs() * (t.mass + t.length);
+        let sines = |trace: &Trace| trace.position.iter().map(|&angle| libm::sin(angle)).collect();
+        if !self.is_linear() {
+            add(GRAVITY, self.gravity, gravity, "", rows.column(sines));
+        }
+        found.push(Nuisance {
+            key: "",
+            declared: 0.0,
+            column: rows.column(torque_rate),
+            tolerance: TIMING_ROWS * rows.kernel.step_s,
+            free: false,
+            effect: "",
+        });
+        Ok(found)
+    }
+
+    /// The model with corrected numbers.
+    pub(super) fn corrected_model(
+        &self,
+        model: &Model,
+        motor: Motor,
+        corrections: &[(&'static str, f64)],
+    ) -> Model {
+        let value = |key: &str, declared: f64| {
+            corrections.iter().find(|(name, _)| *name == key).map_or(declared, |&(_, value)| value)
+        };
+        let keys = if self.is_linear() { LINEAR_KEYS } else { ROTARY_KEYS };
+        let p = self.curve();
+        let curve = Stribeck::new(StribeckParameters {
+            coulomb_nm: value(keys[COULOMB], p.coulomb_nm).max(0.0),
+            static_nm: match p.static_nm == p.coulomb_nm {
+                true => value(keys[COULOMB], p.coulomb_nm).max(0.0),
+                false => value(keys[STATIC], p.static_nm).max(0.0),
+            },
+            viscous_nm_s_rad: value(keys[VISCOUS], p.viscous_nm_s_rad).max(0.0),
+            stribeck_speed_rad_s: value(keys[STRIBECK_SPEED], p.stribeck_speed_rad_s),
+            stribeck_exponent: value(keys[STRIBECK_EXPONENT], p.stribeck_exponent).min(10.0),
+            offset_nm: value(keys[OFFSET], p.offset_nm),
+        })
+        .ok();
+        let has_friction = self.friction.is_some()
+            || corrections.iter().any(|(key, _)| keys[VISCOUS..=OFFSET].contains(key));
+        let friction = if has_friction { curve } else { None };
+        let inertia = value(keys[INERTIA], self.inertia);
+        let inertia = if inertia > 0.0 { inertia } else { self.inertia };
+        let mut model = model.clone();
+        match &mut model.rig {
+            Rig::Robot(robot) => {
+                robot.parameters.wheel_inertia_kg_m2 = inertia;
+                robot.friction[motor as usize] = friction;
+            }
+            Rig::Axis(axis) => match &mut axis.parameters {
+                AxisParameters::Rotary { inertia_kg_m2, gravity_torque_nm, friction: own } => {
+                    (*inertia_kg_m2, *own) = (inertia, friction);
+                    *gravity_torque_nm = value(keys[GRAVITY], self.gravity);
+                }
+                AxisParameters::Linear { mass_kg, friction: own } => (*mass_kg, *own) = (inertia, friction),
+            },
+        }
+        model
+    }
+}
+
+const INERTIA: usize = 0;
+const VISCOUS: usize = 1;
+const COULOMB: usize = 2;
+const OFFSET: usize = 3;
+const STATIC: usize = 4;
+const GRAVITY: usize = 5;
+const STRIBECK_SPEED: usize = 6;
+const STRIBECK_EXPONENT: usize = 7;
+
+/// Keys of the model file in that order.
+const ROTARY_KEYS: [&str; 8] = [
+    "inertia_kg_m2",
+    "viscous_nm_s_rad",
+    "coulomb_nm",
+    "offset_nm",
+    "static_nm",
+    "gravity_torque_nm",
+    "stribeck_speed_rad_s",
+    "stribeck_exponent",
+];
+const LINEAR_KEYS: [&str; 8] = [
+    "mass_kg",
+    "viscous_n_s_m",
+    "coulomb_n",
+    "offset_n",
+    "static_n",
+    "",
+    "stribeck_speed_m_s",
+    "stribeck_exponent",
+];
+
+pub(super) fn direction(speed: f64) -> f64 {
+    if speed == 0.0 { 0.0 } else { speed.signum() }
+}
+
+/// Mean torque over the interval that a second difference sees, if a row's torque acts until the next row.
+pub(super) fn torque_between(trace: &Trace) -> Vec<f64> {
+    let before = |sample: usize| trace.effort[sample.saturating_sub(1)];
+    (0..trace.effort.len()).map(|sample| 0.5 * (trace.effort[sample] + before(sample))).collect()
+}
+
+/// Change of the torque over that interval, N m/s: what a shift in time adds, without a share of the torque's noise.
+fn torque_rate(trace: &Trace) -> Vec<f64> {
+    let before = |sample: usize| trace.effort[sample.saturating_sub(1)];
+    (0..trace.effort.len()).map(|sample| (trace.effort[sample] - before(sample)) / trace.step_s).collect()
+}

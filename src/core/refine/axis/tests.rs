@@ -1,0 +1,261 @@
+//! The loop closed on measured and made logs of one motor or axis.
+
+use std::f64::consts::TAU;
+use std::ops::ControlFlow;
+
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use crate::model_file::Model;
+use crate::record::{ColumnMap, Log, ReadOptions, Severity, read_log};
+use crate::refine::{Options, Refinement, Verdict, refine, residual};
+
+fn refined(model: &str, logs: &[Log], held_out: &[Log], estimate: &[&str]) -> Refinement {
+    let model = Model::from_toml(model, "model.toml").unwrap();
+    let estimate = estimate.iter().map(|&name| name.to_owned()).collect();
+    let options = Options { estimate, ..Options::default() };
+    refine(&model, logs, held_out, &options, &mut |_| ControlFlow::Continue(())).unwrap()
+}
+
+fn ids(found: &Refinement) -> Vec<&str> {
+    found.effects.iter().map(|found| found.effect.id()).collect()
+}
+
+const SHAFT: &str = "name = \"shaft\"\n[axis]\nkind = \"rotary\"\ninertia_kg_m2 = 0.005\n[friction]\n\
+                     coulomb_nm = 0.03\nviscous_nm_s_rad = 0.0005\n";
+
+/// A shaft that turns back and forth without ever resting long, driven by the torque that its motion takes, with what
+/// `more` adds to it; noise of an encoder of 16 bits and of the torque.
+fn shaft(seed: u64, more: impl Fn(f64, f64, f64) -> f64) -> Log {
+    const ROWS: usize = 30_000;
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut uniform = || f64::from(random.next_u32()) / f64::from(u32::MAX) - 0.5;
+    let waves =
+        [(3.0, 0.11), (2.0, 0.23), (1.0, 0.57), (0.3, 1.9)].map(|(size, hz)| (size, hz, TAU * uniform()));
+    let step = TAU / 65_536.0;
+    let mut columns: [Vec<f64>; 3] = Default::default();
+    for row in 0..ROWS {
+        let time = row as f64 * 1e-3;
+        let (mut q, mut v, mut a) = (0.0, 0.0, 0.0);
+        for (size, hz, phase) in waves {
+            let angle = TAU * hz * time + phase;
+            q += size * (1.0 - angle.cos()) / (TAU * hz);
+            v += size * angle.sin();
+            a += size * TAU * hz * angle.cos();
+        }
+        let torque = 0.005 * a + 0.03 * v.signum() + 0.0005 * v + more(time, q, v) + 0.004 * uniform();
+        columns[0].push(time);
+        columns[1].push((q / step + uniform()).round() * step);
+        columns[2].push(torque);
+    }
+    let names = ["time_s", "motor_angle_rad", "torque_nm"];
+    Log::from_columns("made.csv", names.into_iter().zip(columns))
+}
+
+#[test]
+fn a_clean_shaft_lacks_nothing() {
+    for seed in 0..4 {
+        let found = refined(SHAFT, &[shaft(seed, |_, _, _| 0.0)], &[], &[]);
+        assert_eq!(
+            found.verdict,
+            Verdict::ModelAdequate,
+            "{seed}: {:?} {:?}",
+            ids(&found),
+            found.unexplained
+        );
+        let ratio = found.after.rmse.main() / found.after.noise_floor.main();
+        assert!((0.8..1.2).contains(&ratio), "{ratio}");
+    }
+}
+
+#[test]
+fn effects_are_named_and_sized() {
+    // Each takes so much more torque; key and value that it has.
+    type More = fn(f64, f64, f64) -> f64;
+    let cases: [(&str, More, &str, f64); 5] = [
+        ("cogging", |_, q, _| -0.006 * (14.0 * q).sin(), "sin_1_nm", 0.006),
+        ("quadratic_drag", |_, _, v| 4e-4 * v * v.abs(), "drag_nm_s2_rad2", 4e-4),
+        ("viscous_asymmetry", |_, _, v| 0.001 * v.abs(), "viscous_nm_s_rad", 0.001),
+        ("coulomb_error", |_, _, v| 0.012 * v.signum(), "coulomb_nm", 0.012),
+        ("thermal_friction", |t, _, v| 0.01 * (-t / 6.0).exp_m1() * v.signum(), "fall_nm", 0.01),
+    ];
+    for (id, more, key, expected) in cases {
+        let found = refined(SHAFT, &[shaft(1, more)], &[shaft(2, more)], &[]);
+        assert_eq!(ids(&found), [id], "{:?}", found.unexplained);
+        let effect = &found.effects[0];
+        let place = effect.effect.parameters().iter().position(|(name, _)| name == key).unwrap();
+        let (_, value) = effect.effect.parameters()[place];
+        assert!((value / expected - 1.0).abs() < 0.1, "{id}: {value} for {expected}");
+        let [low, high] = effect.ci95[place].unwrap();
+        assert!(low < value && value < high && high - low < 0.5 * expected, "{id}: {low} {high}");
+        assert!(found.after.rmse.main() < 1.1 * found.after.noise_floor.main(), "{id}");
+    }
+}
+
+/// The refined model, written and read again, has the error that was told.
+#[test]
+fn the_refined_model_has_the_error_after() {
+    let more = |_: f64, q: f64, v: f64| 0.006 * (9.0 * q).cos() + 0.012 * v.signum();
+    let held_out = [shaft(2, more)];
+    let found = refined(SHAFT, &[shaft(1, more)], &held_out, &[]);
+    assert_eq!(found.effects.len(), 2, "{:?}", ids(&found));
+    let again = Model::from_toml(&found.model.to_toml(), "new.toml").unwrap();
+    let quiet = &mut |_| ControlFlow::Continue(());
+    let told = residual(&again, &held_out, &Options::default(), quiet).unwrap();
+    let ratio = told.errors.rmse.main() / found.after.rmse.main();
+    assert!((ratio - 1.0).abs() < 0.05, "{ratio}");
+}
+
+/// A spring that no effect of a shaft is: never a wrong name.
+#[test]
+fn what_the_library_lacks_has_no_name() {
+    let found = refined(SHAFT, &[shaft(1, |_, q, _| 0.004 * q)], &[shaft(2, |_, q, _| 0.004 * q)], &[]);
+    assert_eq!((found.verdict, ids(&found)), (Verdict::UnexplainedResidual, vec![]));
+    assert_eq!(found.unexplained.depends_on[0], "motor_angle_rad");
+}
+
+#[test]
+fn logs_that_cannot_answer_are_told_before_any_effect() {
+    let log = shaft(1, |_, q, _| 0.006 * (14.0 * q).sin());
+    let with = |name: &str, change: &dyn Fn(usize, f64) -> f64| {
+        let columns = log.columns.iter().map(|column| {
+            let values = column.values.iter().enumerate();
+            let changed =
+                values.map(|(row, &value)| if column.name == name { change(row, value) } else { value });
+            (column.name.clone(), changed.collect())
+        });
+        Log::from_columns("bad.csv", columns)
+    };
+    let every = |step: usize| {
+        let columns = log
+            .columns
+            .iter()
+            .map(|column| (column.name.clone(), column.values.iter().copied().step_by(step).collect()));
+        Log::from_columns("thin.csv", columns)
+    };
+    let first = |rows: usize| {
+        let columns = log.columns.iter().map(|column| (column.name.clone(), column.values[..rows].to_vec()));
+        Log::from_columns("short.csv", columns)
+    };
+    for (what, bad, column, told) in [
+        ("wrong sign", with("torque_nm", &|_, v| -v), "torque_nm", "sign"),
+        ("milli", with("torque_nm", &|_, v| 1000.0 * v), "torque_nm", "times what the declared model wants"),
+        ("dead", with("motor_angle_rad", &|_, _| 1.0), "motor_angle_rad", "does not change"),
+        ("dead torque", with("torque_nm", &|_, _| 0.01), "torque_nm", "does not change"),
+        ("clipped", with("torque_nm", &|_, v| v.clamp(-0.03, 0.03)), "torque_nm", "cut off"),
+        ("slow", every(30), "time_s", "too few"),
+        ("short", first(600), "motor_angle_rad", "are needed"),
+        (
+            "at rest",
+            with("motor_angle_rad", &|row, _| 1e-4 * f64::from(u8::from(row % 7 == 0))),
+            "motor_angle_rad",
+            "",
+        ),
+    ] {
+        let found = refined(SHAFT, &[bad], &[], &[]);
+        assert_eq!((found.verdict, ids(&found)), (Verdict::DataUnfit, vec![]), "{what}");
+        let mut errors = found.data_health.iter().filter(|finding| finding.severity == Severity::Error);
+        assert!(
+            errors.any(|finding| finding.column == column && finding.problem.contains(told)),
+            "{what}: {:#?}",
+            found.data_health
+        );
+    }
+}
+
+#[test]
+fn the_same_log_gives_the_same_bytes() {
+    let told = || {
+        let found = refined(SHAFT, &[shaft(3, |_, q, _| 0.004 * (5.0 * q).sin())], &[], &[]);
+        serde_json::to_string(&found).unwrap() + &found.document.to_html() + &found.model.to_toml()
+    };
+    assert_eq!(told(), told());
+}
+
+/// A shared log, or nothing where the data are absent and not required.
+#[expect(clippy::disallowed_methods, reason = "measured data are read where they are at hand")]
+fn shared(name: &str, map: &[&str]) -> Option<Log> {
+    let path = format!("{}/../../../shared/data/{name}", env!("CARGO_MANIFEST_DIR"));
+    let Ok(file) = std::fs::File::open(&path) else {
+        assert!(std::env::var_os("FLQR_REQUIRE_SHARED").is_none(), "{path} is absent");
+        println!("skipped: {path} is absent");
+        return None;
+    };
+    let map = ColumnMap::new(map.iter().map(|entry| entry.parse().unwrap()).collect()).unwrap();
+    let reader = std::io::BufReader::new(file);
+    Some(read_log(reader, name, &ReadOptions::new(&map), &mut |_| ControlFlow::Continue(())).unwrap())
+}
+
+const BENCH: &str = "name = \"R0\"\n[axis]\nkind = \"rotary\"\ninertia_kg_m2 = 0.005\n[friction]\n\
+                     coulomb_nm = 0.0338\nstatic_nm = 0.0761\nviscous_nm_s_rad = 0.00049\n\
+                     stribeck_speed_rad_s = 1.612\nstribeck_exponent = 0.231\noffset_nm = -0.0016\n";
+
+#[test]
+fn undeclared_cogging_of_a_bench_log_is_found() {
+    let logs = ["log", "heldout"].map(|part| shared(&format!("undeclared/example-bench/{part}.csv"), &[]));
+    let [Some(log), Some(held_out)] = logs else { return };
+    let found = refined(BENCH, &[log], &[held_out], &[]);
+    assert_eq!(ids(&found), ["cogging"]);
+    let value = |key: &str| found.effects[0].effect.get(key).unwrap();
+    assert_eq!(value("order_1"), 14.0);
+    let size = value("cos_1_nm").hypot(value("sin_1_nm"));
+    assert!((size / 0.009 - 1.0).abs() < 0.1, "{size}");
+}
+
+const LAAS: [&str; 3] = ["torque_nm=current_a", "motor_angle_rad=angle_rad", "motor_speed_rad_s=speed_rad_s"];
+const SMALL: &str = "name = \"small\"\n[axis]\nkind = \"rotary\"\ninertia_kg_m2 = 0.0002\n[friction]\n\
+                     coulomb_nm = 0.08\nviscous_nm_s_rad = 0.0002\n";
+const FREE: [&str; 4] = ["inertia_kg_m2", "viscous_nm_s_rad", "coulomb_nm", "offset_nm"];
+
+#[test]
+fn cogging_of_a_measured_motor_is_found_at_its_order() {
+    let Some(log) = shared("laas_bldc/speed_test1.csv", &LAAS) else { return };
+    let found = refined(SMALL, &[log], &[], &FREE);
+    assert_eq!(ids(&found)[0], "cogging");
+    assert_eq!(found.effects[0].effect.get("order_1"), Some(72.0));
+    let drop = 1.0 - found.after.rmse.main() / found.before.rmse.main();
+    assert!(drop > 0.55, "{drop}");
+}
+
+#[test]
+fn a_fast_measured_motor_gets_no_effect() {
+    let Some(log) = shared("laas_bldc/acc_current.csv", &LAAS) else { return };
+    let found = refined(SMALL, &[log], &[], &FREE);
+    assert!(found.effects.is_empty(), "{:?}", ids(&found));
+    let lag = |finding: &crate::record::HealthFinding| finding.problem.contains("ms later than");
+    assert!(found.data_health.iter().any(lag), "{:#?}", found.data_health);
+}
+
+#[test]
+fn the_published_positioning_axis_lacks_effects() {
+    let Some(log) = shared("emps/emps_standard.csv", &[]) else { return };
+    let model = "name = \"EMPS\"\n[axis]\nkind = \"linear\"\nmass_kg = 95.1089\n[friction]\ncoulomb_n = 20.3935\n\
+                 viscous_n_s_m = 203.5034\noffset_n = -3.1648\n";
+    let found = refined(model, &[log], &[], &["all"]);
+    let (before, after) = (found.before.nrmse.main(), found.after.nrmse.main());
+    assert!((0.038..0.047).contains(&before), "{before}");
+    assert!(after <= 0.026, "{after}: {:?}", ids(&found));
+    assert_eq!(ids(&found)[0], "viscous_asymmetry");
+}
+
+#[test]
+fn a_geared_torque_is_told_before_any_effect() {
+    let map = ["motor_angle_rad=angle_rad", "motor_speed_rad_s=speed_rad_s"];
+    let mended =
+        ["motor_angle_rad=angle_rad", "motor_speed_rad_s=speed_rad_s*6.33", "torque_nm=torque_nm*6.33"];
+    let model = "name = \"pendulum\"\n[axis]\nkind = \"rotary\"\ninertia_kg_m2 = 0.034\ngravity_torque_nm = 1.529\n\
+                 [friction]\ncoulomb_nm = 0.0914\nviscous_nm_s_rad = 0.047\n";
+    let path = |name: &str| format!("go1_pendulum/go1_m1kg_{name}.csv");
+    let Some(raw) = shared(&path("sin_sin"), &map) else { return };
+    let found = refined(model, &[raw], &[], &[]);
+    assert_eq!(found.verdict, Verdict::DataUnfit);
+    assert!(found.data_health[0].problem.contains("a gear lies between"), "{:#?}", found.data_health);
+    let logs: Vec<Log> = ["sin_sin", "lift_and_drop", "sin_time_square"]
+        .iter()
+        .filter_map(|name| shared(&path(name), &mended))
+        .collect();
+    let held_out: Vec<Log> = shared(&path("up_and_down"), &mended).into_iter().collect();
+    let found = refined(model, &logs, &held_out, &["all"]);
+    assert_ne!(found.verdict, Verdict::DataUnfit, "{:#?}", found.data_health);
+    assert!(found.after.nrmse.main() < 0.1, "{}", found.after.nrmse.main());
+}

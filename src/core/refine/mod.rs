@@ -1,0 +1,127 @@
+//! Closing the loop with measured data: the residual of a declared model, the effects that it lacks, and the model
+//! refined by them.
+//!
+//! # Method
+//! 1. The log is checked ([`crate::record::data_health`] and the checks of this room). What makes the question
+//!    unanswerable is said before any effect is named.
+//! 2. Equation errors: every column, the target and each derivative pass one common kernel, and nothing noisy is
+//!    differentiated without it. Rests are left out, as sticking friction takes any value there.
+//! 3. Declared parameters are estimated along within their tolerances.
+//! 4. The rows are made white by the residual's own correlation, the same filter for every column ([`whiten`]).
+//! 5. Each effect of the library gives columns: its law over the recorded motion at unit amplitude. Forward selection
+//!    with swaps, pairs and one backward check on the error of left-out blocks ([`select`]). Intervals come from the
+//!    jackknife over blocks.
+//! 6. What is left is held against smooth functions of everything that was recorded. A residual that these explain much
+//!    better than the library does has no name: `unexplained_residual`.
+
+mod axis;
+mod error;
+mod pages;
+mod robot;
+pub mod select;
+mod verdict;
+pub mod whiten;
+
+use std::ops::ControlFlow;
+
+use crate::model_file::{AxisParameters, Model, Rig};
+use crate::record::{Log, LogKind};
+use crate::robot::Motor;
+
+pub use error::RefineError;
+pub use verdict::{
+    Channels, Corrected, Errors, Found, Prediction, Quantity, Refinement, Residual, Sized, Test, Unexplained,
+    Verdict,
+};
+
+/// How a model is refined.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// Motor of a robot's model that a bench log belongs to.
+    pub motor: Motor,
+    /// Declared numbers that are free, as named in the model file; `all` stands for inertia or mass, viscous, Coulomb
+    /// and offset. The others are estimated along within their tolerances.
+    pub estimate: Vec<String>,
+    /// Seed of everything that is drawn.
+    pub seed: u64,
+}
+
+/// How far a model is from logs of its machine.
+///
+/// # Errors
+/// No log, logs of several kinds, a log of another machine or without its columns.
+pub fn residual(
+    model: &Model,
+    logs: &[Log],
+    options: &Options,
+    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> Result<Residual, RefineError> {
+    match kind_of(model, logs)? {
+        LogKind::Robot => robot::residual(model, logs, options, watch),
+        _ => axis::residual(model, logs, options, watch),
+    }
+}
+
+/// Finds what a model lacks, and adds it. Without `held_out` logs the last third of each log is held out, after a gap
+/// of 0.5 s.
+///
+/// `watch` is told the share of the work that is done.
+///
+/// # Errors
+/// No log, logs of several kinds, a log of another machine or without its columns, a name in `estimate` that is no
+/// parameter, or the watcher ended it.
+pub fn refine(
+    model: &Model,
+    logs: &[Log],
+    held_out: &[Log],
+    options: &Options,
+    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> Result<Refinement, RefineError> {
+    let kind = kind_of(model, logs)?;
+    if !held_out.is_empty() {
+        kind_of(model, held_out)?;
+    }
+    match kind {
+        LogKind::Robot => robot::refine(model, logs, held_out, options, watch),
+        _ => axis::refine(model, logs, held_out, options, watch),
+    }
+}
+
+/// What all of the logs hold, as far as the model describes it: a log may serve several kinds.
+fn kind_of(model: &Model, logs: &[Log]) -> Result<LogKind, RefineError> {
+    let first = logs.first().ok_or(RefineError::NoLogs)?;
+    let (kinds, wanted): (&[LogKind], _) = match &model.rig {
+        Rig::Robot(_) => (&[LogKind::Robot, LogKind::Bench], "robot, or one of its wheels in the air"),
+        Rig::Axis(axis) => match axis.parameters {
+            AxisParameters::Rotary { .. } => (&[LogKind::Bench], "motor's shaft"),
+            AxisParameters::Linear { .. } => (&[LogKind::LinearAxis], "linear axis"),
+        },
+    };
+    let kind_of = |log: &Log| kinds.iter().copied().find(|kind| log.serves(*kind));
+    for log in logs {
+        if kind_of(log).is_some() {
+            continue;
+        }
+        return Err(match log.kind() {
+            Ok(LogKind::FrictionPairs) => RefineError::Pairs { file: log.source.clone() },
+            Ok(kind) => RefineError::WrongModel { file: log.source.clone(), kind, wanted },
+            Err(_) => log.missing_for(nearest(log, kinds)).into(),
+        });
+    }
+    let kind = kind_of(first).unwrap_or(kinds[0]);
+    match logs.iter().find(|log| kind_of(log) != Some(kind)) {
+        None => Ok(kind),
+        Some(other) => Err(RefineError::MixedLogs {
+            first: first.source.clone(),
+            first_kind: kind,
+            second: other.source.clone(),
+            second_kind: kind_of(other).unwrap_or(kind),
+        }),
+    }
+}
+
+/// The kind of which a log lacks the fewest columns.
+fn nearest(log: &Log, kinds: &[LogKind]) -> LogKind {
+    let missing = |kind: &LogKind| kind.required().iter().filter(|name| log.column(name).is_none()).count();
+    kinds.iter().copied().min_by_key(missing).unwrap_or(LogKind::Bench)
+}

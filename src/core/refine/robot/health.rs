@@ -1,0 +1,199 @@
+//! What makes a robot's log unfit, said before any effect is named.
+
+use crate::model_file::RobotModel;
+use crate::record::{self, HealthFinding, Log, Severity};
+
+use super::candidates::quantile;
+use super::motion::Readings;
+use super::trace::Trace;
+
+/// Changes within 0.1 s, root mean square, below which a robot stands: one that only hunts about its place shows a tenth
+/// of those of a driven one, among friction that sticks.
+const STILL_MOTOR_RAD: f64 = 0.1;
+const STILL_PITCH_RAD: f64 = 0.005;
+
+/// Shortest log that can answer, s, and longest time between its rows, s.
+const SHORTEST_S: f64 = 8.0;
+const SLOWEST_S: f64 = 0.0101;
+
+pub(super) fn unfit(findings: &[HealthFinding]) -> bool {
+    findings.iter().any(|finding| finding.severity == Severity::Error)
+}
+
+/// Findings about logs as they are.
+pub(super) fn check(logs: &[Log], readings: &[Readings], robot: &RobotModel) -> Vec<HealthFinding> {
+    let mut found: Vec<HealthFinding> = logs.iter().flat_map(record::data_health).collect();
+    for (log, readings) in logs.iter().zip(readings) {
+        found.extend(of_log(log, readings, robot));
+    }
+    found
+}
+
+fn finding(severity: Severity, column: &str, problem: String, mend: &str) -> HealthFinding {
+    HealthFinding { severity, column: column.to_owned(), problem, mend: mend.to_owned() }
+}
+
+fn of_log(log: &Log, readings: &Readings, robot: &RobotModel) -> Vec<HealthFinding> {
+    let mut found = Vec::new();
+    let error = |column: &str, problem: String, mend: &str| finding(Severity::Error, column, problem, mend);
+    let seconds = readings.rows() as f64 * readings.dt_s;
+    if seconds < SHORTEST_S {
+        found.push(error(
+            "time_s",
+            format!("the log is {seconds:.1} s long, too short to tell effects apart"),
+            "record 30 seconds and more",
+        ));
+    }
+    if readings.dt_s > SLOWEST_S {
+        let problem = format!("{:.0} rows a second are too few for a balancing loop", 1.0 / readings.dt_s);
+        found.push(error("time_s", problem, "record every tick of the controller"));
+    }
+    for name in super::motion::COLUMNS {
+        if let Some(values) = log.column(name)
+            && values.iter().all(|value| *value == values[0])
+        {
+            found.push(error(name, "never changes".to_owned(), "check the sensor and its wire"));
+        }
+    }
+    if !unfit(&found) {
+        found.extend(of_signals(log, readings, robot));
+    }
+    found
+}
+
+/// Slope of b over a, through the origin, and their correlation.
+fn relation(a: &[f64], b: &[f64]) -> (f64, f64) {
+    let sum = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let (aa, ab, bb) = (sum(a, a), sum(a, b), sum(b, b));
+    (ab / aa.max(1e-300), ab / (aa * bb).sqrt().max(1e-300))
+}
+
+/// Changes over a tenth of a second.
+fn changes(column: &[f64], lag: usize) -> Vec<f64> {
+    (lag..column.len()).step_by(lag.div_ceil(2)).map(|i| column[i] - column[i - lag]).collect()
+}
+
+/// Integrals over a tenth of a second.
+fn sums(column: &[f64], lag: usize, dt_s: f64) -> Vec<f64> {
+    let mut total = 0.0;
+    let running: Vec<f64> = std::iter::once(0.0)
+        .chain(column.iter().map(|value| {
+            total += value * dt_s;
+            total
+        }))
+        .collect();
+    (lag..column.len()).step_by(lag.div_ceil(2)).map(|i| running[i] - running[i - lag]).collect()
+}
+
+fn of_signals(log: &Log, readings: &Readings, robot: &RobotModel) -> Vec<HealthFinding> {
+    let mut found = Vec::new();
+    let lag = ((0.1 / readings.dt_s) as usize).max(2);
+    let dt_s = readings.dt_s;
+    let pitch = changes(&readings.pitch_rad, lag);
+    let rms = |values: &[f64]| (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt();
+    let moved = changes(&readings.angle_rad[0], lag);
+    if rms(&moved) < STILL_MOTOR_RAD && rms(&pitch) < STILL_PITCH_RAD {
+        let problem = "the robot hardly moves, so that effects cannot be told apart".to_owned();
+        found.push(finding(
+            Severity::Error,
+            "motor_angle_left_rad",
+            problem,
+            "drive to and fro, with tones of torque on top",
+        ));
+        return found;
+    }
+    let mut compare = |column: &str, (slope, correlation): (f64, f64), of: &str| {
+        let problem = if correlation < -0.7 {
+            format!("runs against {of}: its sign is wrong")
+        } else if correlation.abs() < 0.5 {
+            format!("does not follow {of} (correlation {correlation:.2}): a dead or mistaken sensor")
+        } else if !(0.75..1.33).contains(&slope.abs()) {
+            format!("is {slope:.3} times what {of} says: its unit is wrong")
+        } else {
+            return;
+        };
+        found.push(finding(
+            Severity::Error,
+            column,
+            problem,
+            "map the column with the right factor, --map COLUMN=COLUMN*FACTOR",
+        ));
+    };
+    compare(
+        "pitch_rate_rad_s",
+        relation(&pitch, &sums(&readings.rate_rad_s, lag, dt_s)),
+        "the change of pitch_rad",
+    );
+    let names = [
+        ["motor_angle_left_rad", "motor_speed_left_rad_s"],
+        ["motor_angle_right_rad", "motor_speed_right_rad_s"],
+    ];
+    let angles = [moved, changes(&readings.angle_rad[1], lag)];
+    let speeds = names.map(|[_, name]| log.column(name).map(|speed| sums(speed, lag, dt_s)));
+    for motor in 0..2 {
+        if let Some(speed) = speeds[motor].as_ref().filter(|speed| speed.len() == angles[motor].len()) {
+            compare(
+                names[motor][1],
+                relation(&angles[motor], speed),
+                &format!("the change of {}", names[motor][0]),
+            );
+        }
+    }
+    let radius = robot.parameters.wheel_radius_m;
+    let rolled: Vec<f64> =
+        (0..pitch.len()).map(|i| radius * (0.5 * (angles[0][i] + angles[1][i]) + pitch[i])).collect();
+    compare("x_m", relation(&rolled, &changes(&readings.x_m, lag)), "radius × (motor angle + pitch)");
+    compare("motor_angle_right_rad", relation(&angles[0], &angles[1]), "the left motor's angle");
+    if let [Some(left), Some(right)] = &speeds
+        && left.len() == angles[0].len()
+        && right.len() == angles[1].len()
+    {
+        let apart = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+        let own = apart(left, &angles[0]) + apart(right, &angles[1]);
+        let crossed = apart(left, &angles[1]) + apart(right, &angles[0]);
+        if crossed < 0.2 * own {
+            let problem = "follows the other motor's angle: left and right are swapped".to_owned();
+            found.push(finding(
+                Severity::Error,
+                "motor_speed_left_rad_s",
+                problem,
+                "map both columns crosswise",
+            ));
+        }
+    }
+    for (motor, name) in ["torque_left_nm", "torque_right_nm"].into_iter().enumerate() {
+        let torque = &readings.torque_nm[motor];
+        let peak = torque.iter().fold(0.0_f64, |a, b| a.max(b.abs()));
+        let clipped =
+            torque.iter().filter(|value| value.abs() > 0.9999 * peak).count() as f64 / torque.len() as f64;
+        if clipped > 0.01 {
+            let problem = format!("{:.1} % of the rows are at the limit of {peak:.3} N m", 100.0 * clipped);
+            let severity = if clipped > 0.1 { Severity::Error } else { Severity::Warning };
+            found.push(finding(severity, name, problem, "record with less demand, or the torque that acts"));
+        }
+    }
+    found
+}
+
+/// Findings about the equations: a torque that cannot be what moves this robot.
+pub(super) fn check_motion(trace: &Trace<'_>) -> Vec<HealthFinding> {
+    let residual = trace.residual();
+    let torque = trace.torque_nm();
+    // r2 = (what the motion asks for) + T: of the right unit and sign the motion asks for −T.
+    let asked: Vec<f64> = residual[1].iter().zip(&torque).map(|(r2, torque)| torque - r2).collect();
+    let spread = quantile(&torque.iter().map(|t| t.abs()).collect::<Vec<_>>(), 0.9);
+    let (slope, correlation) = relation(&torque, &asked);
+    let problem = if spread < 0.02 {
+        "the motors hardly push, so that effects cannot be told apart".to_owned()
+    } else if correlation < -0.5 {
+        "pushes against the motion: its sign is wrong".to_owned()
+    } else if correlation > 0.5 && !(0.5..2.0).contains(&slope) {
+        format!("is {:.3} times the torque that the motion needs: its unit is wrong", 1.0 / slope)
+    } else if correlation.abs() < 0.5 {
+        format!("does not go with the motion (correlation {correlation:.2}): another column, model or pitch")
+    } else {
+        return Vec::new();
+    };
+    let mend = "map the column with the right factor, --map torque_left_nm=COLUMN*FACTOR, or mend the model";
+    vec![finding(Severity::Error, "torque_left_nm", problem, mend)]
+}

@@ -1,0 +1,268 @@
+//! A robot that balances: the residuals of translation and pitch, and what its model lacks.
+//!
+//! # Method
+//! r1 and r2 are weak forms: integrals of the log against one smooth bump and its differences ([`kernel`]), so that
+//! nothing noisy is differentiated. Between the IMU's held readings the declared model moves the robot on under the
+//! recorded torques ([`motion`]). The residuals are turned into two channels that the gyro's noise does not couple, each
+//! made white ([`channels`]). Every effect gives columns in both, by its own law over the recorded motion ([`trace`]);
+//! declared numbers are free within their tolerances ([`nuisance`]); forward selection with swaps judges by left-out
+//! blocks ([`search`]). A second pass fills the gaps with the motion of the model that has the effects.
+
+mod candidates;
+mod channels;
+mod found;
+mod health;
+mod kernel;
+mod leftover;
+mod motion;
+mod nuisance;
+mod search;
+mod trace;
+
+use std::ops::ControlFlow;
+
+use crate::identify::quantile::student_t_975;
+use crate::model_file::{Model, RobotModel};
+use crate::record::{HealthFinding, Log, LogKind, Severity};
+
+use super::error::RefineError;
+use super::verdict::{
+    Channels as PerChannel, Corrected, Errors, Found, Quantity, Refinement, Residual, Unexplained, Verdict,
+};
+use super::{Options, pages};
+use candidates::library;
+use channels::Channels;
+use motion::Readings;
+use nuisance::{Nuisance, nuisances};
+use search::{Fit, Search, whitened};
+use trace::{Pair, Part, Trace};
+
+/// Share of the structure that named effects must explain, so that they can be its cause.
+const EXPLAINED: f64 = 0.95;
+
+/// Told the share of the work that is done; may end it.
+type Watch<'a> = &'a mut dyn FnMut(f64) -> ControlFlow<()>;
+
+fn report(watch: Watch<'_>, share: f64) -> Result<(), RefineError> {
+    if watch(share).is_break() { Err(RefineError::Cancelled) } else { Ok(()) }
+}
+
+/// How far a model is from logs of its robot.
+pub(super) fn residual(
+    model: &Model,
+    logs: &[Log],
+    _options: &Options,
+    watch: Watch<'_>,
+) -> Result<Residual, RefineError> {
+    let robot = robot_of(model, logs)?;
+    let readings = read(logs)?;
+    let mut data_health = health::check(logs, &readings, robot);
+    report(watch, 0.3)?;
+    if health::unfit(&data_health) {
+        return Ok(Residual { errors: Errors::default(), tests: Vec::new(), data_health });
+    }
+    let trace = Trace::new(robot, readings.clone(), readings);
+    data_health.extend(health::check_motion(&trace));
+    report(watch, 0.8)?;
+    let residual = trace.residual();
+    let channels = Channels::new(&trace, &residual);
+    let errors = errors(&trace, &channels, &residual);
+    let tests = leftover::tests(&trace, &channels, &residual);
+    Ok(Residual { errors, tests, data_health })
+}
+
+fn robot_of<'a>(model: &'a Model, logs: &[Log]) -> Result<&'a RobotModel, RefineError> {
+    let first = logs.first().ok_or(RefineError::NoLogs)?;
+    model.robot().ok_or_else(|| RefineError::WrongModel {
+        file: first.source.clone(),
+        kind: LogKind::Robot,
+        wanted: "motor or axis",
+    })
+}
+
+fn read(logs: &[Log]) -> Result<Vec<Readings>, RefineError> {
+    let read = |log: &Log| Readings::new(log).ok_or_else(|| log.missing_for(LogKind::Robot).into());
+    logs.iter().map(read).collect()
+}
+
+/// Finds what the model of a robot lacks. Without `held_out` logs the last third of each log is held out.
+pub(super) fn refine(
+    model: &Model,
+    logs: &[Log],
+    held_out: &[Log],
+    options: &Options,
+    watch: Watch<'_>,
+) -> Result<Refinement, RefineError> {
+    let robot = robot_of(model, logs)?;
+    let (training, others) = (read(logs)?, read(held_out)?);
+    let mut data_health = health::check(logs, &training, robot);
+    if health::unfit(&data_health) {
+        return Ok(unfit(model, data_health));
+    }
+    let biases = found::gyro_bias(&training);
+    let mut trace = Trace::new(robot, training, others);
+    data_health.extend(health::check_motion(&trace));
+    if data_health.iter().any(|finding| finding.severity == Severity::Error) {
+        return Ok(unfit(model, data_health));
+    }
+    check_names(&nuisances(&trace, &[]), &options.estimate)?;
+    let mut channels = Channels::new(&trace, &trace.residual());
+    for pass in 0..2 {
+        report(watch, 0.1 + 0.45 * f64::from(pass))?;
+        let target = trace.residual();
+        let (mut free, mut tried) = (nuisances(&trace, &options.estimate), library(&trace));
+        whitened(&mut tried, &mut free, &channels);
+        let mut search = Search::new(&trace, &channels, &free, &tried, &target);
+        search.run(&mut |share| report(watch, 0.1 + 0.45 * f64::from(pass) + 0.4 * share))?;
+        let Some(fit) = search.fit(&search.picks) else { return Ok(unfit(model, data_health)) };
+        let last = pass == 1 || search.picks.is_empty();
+        if last {
+            return Ok(answer(model, logs, &search, &fit, biases, data_health));
+        }
+        let left = search.left_raw(&search.picks, &fit.judged.coefficients);
+        let loads = trace.loads(&found::laws(&search, &fit));
+        channels = Channels::new(&trace, &left);
+        trace.refill(&loads, 0.0);
+    }
+    Ok(unfit(model, data_health))
+}
+
+fn check_names(nuisances: &[Nuisance], names: &[String]) -> Result<(), RefineError> {
+    let known: Vec<&str> = nuisances.iter().map(|n| n.key).filter(|key| !key.is_empty()).collect();
+    match names.iter().find(|name| *name != "all" && !known.contains(&name.as_str())) {
+        Some(name) => Err(RefineError::UnknownParameter { name: name.clone(), allowed: known.join(", ") }),
+        None => Ok(()),
+    }
+}
+
+fn unfit(model: &Model, data_health: Vec<HealthFinding>) -> Refinement {
+    let worst = data_health.iter().find(|finding| finding.severity == Severity::Error);
+    Refinement {
+        verdict: Verdict::DataUnfit,
+        effects: Vec::new(),
+        before: Errors::default(),
+        after: Errors::default(),
+        unexplained: Unexplained::default(),
+        next_experiment: worst.map(|finding| finding.mend.clone()),
+        data_health,
+        parameters: Vec::new(),
+        model: model.clone(),
+        document: Default::default(),
+    }
+}
+
+fn answer(
+    model: &Model,
+    logs: &[Log],
+    search: &Search<'_>,
+    fit: &Fit,
+    biases: Vec<Found>,
+    data_health: Vec<HealthFinding>,
+) -> Refinement {
+    let trace = search.trace;
+    let bare = search.fit(&[]);
+    let bare = bare.as_ref().unwrap_or(fit);
+    let rows = search.rows() as f64;
+    let (lacking, leftover) = (bare.score / rows - 1.0, fit.score / rows - 1.0);
+    let structure = leftover::structure(search, fit);
+    let explained = search.picks.is_empty() || structure.is_none() || 1.0 - leftover / lacking > EXPLAINED;
+    let picks = if explained { search.picks.as_slice() } else { &[] };
+    let used = if explained { fit } else { bare };
+    let mut effects = found::effects(search, picks, used);
+    effects.extend(biases);
+    let residual =
+        |picks: &[candidates::Candidate], fit: &Fit| search.left_raw(picks, &fit.judged.coefficients);
+    let (left_before, left_after) = (residual(&[], bare), residual(picks, used));
+    let before = errors(trace, search.channels, &left_before);
+    let after = errors(trace, search.channels, &left_after);
+    let verdict = match (effects.is_empty(), &structure) {
+        (false, _) => Verdict::EffectsFound,
+        (true, Some(_)) => Verdict::UnexplainedResidual,
+        (true, None) => Verdict::ModelAdequate,
+    };
+    let parameters = corrections(search.nuisances, used);
+    let refined = found::refined(model, search, picks, used, &effects, &parameters);
+    let mut refinement = Refinement {
+        verdict,
+        next_experiment: found::next_experiment(&effects, structure.as_ref()),
+        effects,
+        before,
+        after,
+        unexplained: structure.unwrap_or_default(),
+        data_health,
+        parameters,
+        model: refined,
+        document: Default::default(),
+    };
+    let figures = figures(search, &left_before, &left_after);
+    refinement.document = pages::document(&refinement, logs, &figures, WORDS);
+    refinement
+}
+
+/// What the pictures call the robot's variables.
+const WORDS: pages::Words = pages::Words {
+    effort: "combined force",
+    effort_unit: "N",
+    position: ("motor angle", "rad"),
+    speed: ("motor speed", "rad/s"),
+};
+
+/// c at the held-out rows, as pictures take it.
+fn figures(search: &Search<'_>, before: &Pair, after: &Pair) -> pages::Figures {
+    let trace = search.trace;
+    let parts = trace.parts();
+    let held = |column: Vec<f64>| -> Vec<f64> {
+        column.into_iter().zip(&parts).filter(|(_, part)| **part == Part::HeldOut).map(|(v, _)| v).collect()
+    };
+    pages::Figures {
+        time_s: held(trace.variable(|m| m.time_s)),
+        position: held(trace.variable(|m| m.motor_angle_rad.rem_euclid(std::f64::consts::TAU))),
+        speed: held(trace.variable(|m| m.motor_speed_rad_s)),
+        before: held(search.channels.combined(before)),
+        after: held(search.channels.combined(after)),
+    }
+}
+
+fn corrections(nuisances: &[Nuisance], fit: &Fit) -> Vec<Corrected> {
+    let t = student_t_975(fit.blocks.count().max(2) - 1);
+    let corrected = |(index, nuisance): (usize, &Nuisance)| {
+        let value = nuisance.declared + fit.judged.coefficients[index];
+        let width = t * fit.judged.standard_error(index);
+        Corrected {
+            key: nuisance.key,
+            declared: nuisance.declared,
+            value,
+            ci95: Some([value - width, value + width]),
+        }
+    };
+    nuisances.iter().enumerate().filter(|(_, nuisance)| !nuisance.key.is_empty()).map(corrected).collect()
+}
+
+/// Root mean squares on the rows that are held out.
+fn errors(trace: &Trace<'_>, channels: &Channels, left: &Pair) -> Errors {
+    let parts = trace.parts();
+    let rms = |column: &[f64]| {
+        let rows = column.iter().zip(&parts).filter(|(_, part)| **part == Part::HeldOut);
+        let (sum, count) =
+            rows.fold((0.0, 0.0), |(sum, count), (value, _)| (sum + value * value, count + 1.0));
+        (sum / f64::max(count, 1.0)).sqrt()
+    };
+    let torque = rms(&trace.torque_nm());
+    let radius = trace.machine.parameters.wheel_radius_m;
+    let names = [("combined", "N"), ("translation", "N"), ("pitch", "N m")];
+    let columns = [channels.combined(left), left[0].clone(), left[1].clone()];
+    let scales = [torque / radius, torque / radius, torque];
+    let per = |value: &dyn Fn(usize) -> f64, plain: bool| {
+        let of = |(i, (name, unit)): (usize, &(&'static str, &'static str))| {
+            (*name, Quantity { value: value(i), unit: if plain { "1" } else { unit } })
+        };
+        PerChannel(names.iter().enumerate().map(of).collect())
+    };
+    let found: Vec<f64> = columns.iter().map(|column| rms(column)).collect();
+    Errors {
+        rmse: per(&|i| found[i], false),
+        noise_floor: per(&|i| channels.floors[i], false),
+        nrmse: per(&|i| found[i] / scales[i], true),
+        prediction: Vec::new(),
+    }
+}

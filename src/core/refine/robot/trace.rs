@@ -1,0 +1,286 @@
+//! Logs as rows of r1 and r2, and effects as columns over the same rows.
+
+use std::f64::consts::TAU;
+
+use crate::effects::{Action, EffectKind, Machine, Moment, Place, Term};
+use crate::model_file::RobotModel;
+
+use super::kernel::Kernel;
+use super::motion::{Loads, Motion, Readings, of_action};
+
+/// What a row is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Part {
+    Fit,
+    Gap,
+    HeldOut,
+}
+
+/// Values in r1 and r2 at every row.
+pub(super) type Pair = [Vec<f64>; 2];
+
+/// How a kind of effect enters, where there is more than one way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Form {
+    /// As its law says.
+    Law,
+    /// Only where the motors turn forward.
+    Forward,
+    /// A mode of the body that its own turning drives.
+    Driven,
+    /// Waves of the ground: their length is the second shape parameter.
+    Wave,
+    /// The log read with an IMU that speaks late.
+    Late,
+}
+
+/// A stretch of one log.
+struct Piece {
+    readings: Readings,
+    motion: Motion,
+    parts: Vec<Part>,
+}
+
+/// All rows.
+pub(super) struct Trace<'a> {
+    pub(super) robot: &'a RobotModel,
+    pub(super) machine: Machine,
+    pub(super) kernel: Kernel,
+    pieces: Vec<Piece>,
+}
+
+/// Where the rows of one log stand.
+pub(super) struct Run {
+    pub(super) rows: std::ops::Range<usize>,
+}
+
+/// Gap before the part of a log that is held out, s.
+const GAP_S: f64 = 0.5;
+
+impl<'a> Trace<'a> {
+    /// Rows of the logs; where none are held out, of each log its last third is.
+    pub(super) fn new(robot: &'a RobotModel, training: Vec<Readings>, held_out: Vec<Readings>) -> Self {
+        let dt_s = training.first().map_or(1e-3, |readings| readings.dt_s);
+        let kernel = Kernel::new(dt_s);
+        let split = held_out.is_empty();
+        let parts = |readings: &Readings, fit: bool| -> Vec<Part> {
+            let count = kernel.count(readings.rows());
+            let first = (2.0 / 3.0 * readings.rows() as f64) as usize;
+            let gap = (GAP_S / readings.dt_s) as usize;
+            let part = |row: usize| {
+                let centre = kernel.centre(row);
+                match (fit, split) {
+                    (false, _) => Part::HeldOut,
+                    (true, true) if centre >= first + gap => Part::HeldOut,
+                    (true, true) if centre >= first => Part::Gap,
+                    _ => Part::Fit,
+                }
+            };
+            (0..count).map(part).collect()
+        };
+        let logs =
+            training.into_iter().map(|log| (log, true)).chain(held_out.into_iter().map(|log| (log, false)));
+        let pieces = logs
+            .map(|(readings, fit)| {
+                let motion = Motion::new(&readings, robot, &kernel, None, 0.0);
+                Piece { parts: parts(&readings, fit), readings, motion }
+            })
+            .collect();
+        Self { robot, machine: Machine::robot(robot), kernel, pieces }
+    }
+
+    /// Time between rows, s.
+    pub(super) fn step_s(&self) -> f64 {
+        self.pieces.first().map_or(1e-2, |piece| piece.readings.dt_s * self.kernel.thinning as f64)
+    }
+
+    /// What each row is for.
+    pub(super) fn parts(&self) -> Vec<Part> {
+        self.pieces.iter().flat_map(|piece| piece.parts.iter().copied()).collect()
+    }
+
+    /// Rows log by log.
+    pub(super) fn runs(&self) -> Vec<Run> {
+        let mut start = 0;
+        let run = |piece: &Piece| {
+            let rows = start..start + piece.parts.len();
+            start = rows.end;
+            Run { rows }
+        };
+        self.pieces.iter().map(run).collect()
+    }
+
+    /// r1 and r2 of the declared model.
+    pub(super) fn residual(&self) -> Pair {
+        [0, 1].map(|equation: usize| {
+            self.pieces.iter().flat_map(|piece| piece.motion.residual[equation].iter().copied()).collect()
+        })
+    }
+
+    /// T of both motors.
+    pub(super) fn torque_nm(&self) -> Vec<f64> {
+        self.pieces.iter().flat_map(|piece| piece.motion.torque_nm.iter().copied()).collect()
+    }
+
+    /// A variable at every row, from the left motor's moment.
+    pub(super) fn variable(&self, of: impl Fn(&Moment) -> f64) -> Vec<f64> {
+        let at = |piece: &Piece| -> Vec<f64> {
+            (0..piece.parts.len()).map(|row| of(&piece.motion.moments[0][self.kernel.centre(row)])).collect()
+        };
+        self.pieces.iter().flat_map(at).collect()
+    }
+
+    /// Every moment of the left motor.
+    pub(super) fn moments(&self) -> impl Iterator<Item = &Moment> {
+        self.pieces.iter().flat_map(|piece| &piece.motion.moments[0])
+    }
+
+    /// The motion anew, with what effects add to it.
+    pub(super) fn refill(&mut self, loads: &[Loads], imu_delay_s: f64) {
+        for (piece, loads) in self.pieces.iter_mut().zip(loads) {
+            piece.motion = Motion::new(&piece.readings, self.robot, &self.kernel, Some(loads), imu_delay_s);
+        }
+    }
+
+    /// r1 and r2 of an arbitrary action over the rows; `action` makes a fresh law for each log.
+    pub(super) fn pair<F: FnMut(&Moment) -> Action>(&self, mut action: impl FnMut() -> F) -> Pair {
+        let mut found = [Vec::new(), Vec::new()];
+        let radius = self.machine.parameters.wheel_radius_m;
+        for piece in &self.pieces {
+            let mut law = action();
+            let mut raw = [Vec::new(), Vec::new()];
+            for moment in &piece.motion.moments[0] {
+                let [r1, r2] = of_action(&law(moment), moment.direction(), radius);
+                raw[0].push(r1);
+                raw[1].push(r2);
+            }
+            for (found, raw) in found.iter_mut().zip(&raw) {
+                found.extend(self.kernel.apply(raw, 0));
+            }
+        }
+        found
+    }
+
+    /// Unit columns of a kind in a form at shape parameters.
+    pub(super) fn columns(&self, kind: &'static EffectKind, form: Form, shape: &[f64]) -> Vec<Pair> {
+        match form {
+            Form::Law => {
+                let terms = kind.terms(&self.machine, shape);
+                terms.iter().map(|term| self.term(kind, term)).collect()
+            }
+            Form::Forward => vec![self.pair(|| {
+                |m: &Moment| {
+                    let forward = if m.motor_speed_rad_s > 0.0 { 2.0 } else { 0.0 };
+                    let size = if kind.id == "viscous_asymmetry" { m.motor_speed_rad_s } else { 1.0 };
+                    Action::motor(-forward * size)
+                }
+            })],
+            Form::Driven => vec![self.driven(shape)],
+            Form::Wave => [0.0, 0.25]
+                .map(|quarter| {
+                    let (length_m, weight_n) = (shape[1], self.machine.weight_n());
+                    self.pair(|| {
+                        move |m: &Moment| {
+                            let phase = TAU * (m.x_m / length_m - quarter);
+                            Action::force(weight_n * TAU / length_m * libm::cos(phase), 0.0, 0.0)
+                        }
+                    })
+                })
+                .into(),
+            Form::Late => vec![self.late(shape[0])],
+        }
+    }
+
+    /// Torque that a part of the body on a spring adds, per inertia of the part.
+    fn driven(&self, shape: &[f64]) -> Pair {
+        let (omega, damping) = (TAU * shape[0], shape[1]);
+        self.pair(|| {
+            let (mut shift, mut speed) = (0.0, 0.0);
+            move |m: &Moment| {
+                let pull = omega * omega * shift + 2.0 * damping * omega * speed;
+                let accel = -pull - m.pitch_accel_rad_s2;
+                speed += m.dt_s * accel;
+                shift += m.dt_s * speed;
+                Action::body(pull + m.pitch_accel_rad_s2)
+            }
+        })
+    }
+
+    /// What the residual changes by where the IMU speaks late.
+    fn late(&self, delay_s: f64) -> Pair {
+        let mut found = [Vec::new(), Vec::new()];
+        for piece in &self.pieces {
+            let now = Motion::new(&piece.readings, self.robot, &self.kernel, None, 0.0);
+            let late = Motion::new(&piece.readings, self.robot, &self.kernel, None, delay_s);
+            for (equation, found) in found.iter_mut().enumerate() {
+                let pairs = now.residual[equation].iter().zip(&late.residual[equation]);
+                found.extend(pairs.map(|(now, late)| now - late));
+            }
+        }
+        found
+    }
+
+    fn raw_term(&self, kind: &'static EffectKind, term: &Term, piece: &Piece) -> Pair {
+        let radius = self.machine.parameters.wheel_radius_m;
+        let rows = piece.readings.rows();
+        let mut raw = [vec![0.0; rows], vec![0.0; rows]];
+        let motors = if kind.per_motor() { 2 } else { 1 };
+        let moments = if kind.place == Place::Actuator { &piece.motion.asked } else { &piece.motion.moments };
+        for moments in moments.iter().take(motors) {
+            let mut law = term.law.clone();
+            for (row, moment) in moments.iter().enumerate() {
+                let [r1, r2] = of_action(&law.act(moment), moment.direction(), radius);
+                raw[0][row] += r1;
+                raw[1][row] += r2;
+            }
+        }
+        if kind.place == Place::Actuator {
+            // Torques act from their row on; the rows' own times are between two of them.
+            for column in &mut raw {
+                let mut before = column[0];
+                for value in column.iter_mut() {
+                    let now = *value;
+                    *value = 0.5 * (now + before);
+                    before = now;
+                }
+            }
+        }
+        raw
+    }
+
+    fn term(&self, kind: &'static EffectKind, term: &Term) -> Pair {
+        let mut found = [Vec::new(), Vec::new()];
+        for piece in &self.pieces {
+            let raw = self.raw_term(kind, term, piece);
+            for (found, raw) in found.iter_mut().zip(&raw) {
+                found.extend(self.kernel.apply(raw, 0));
+            }
+        }
+        found
+    }
+
+    /// What chosen effects add to the motion of each log: `terms` are laws with their coefficients.
+    pub(super) fn loads(&self, chosen: &[(&'static EffectKind, Term, f64)]) -> Vec<Loads> {
+        let radius = self.machine.parameters.wheel_radius_m;
+        let of_piece = |piece: &Piece| {
+            let rows = piece.readings.rows();
+            let mut loads =
+                Loads { shafts_nm: vec![0.0; rows], axle_n: vec![0.0; rows], body_nm: vec![0.0; rows] };
+            for (kind, term, size) in chosen {
+                let [r1, r2] = self.raw_term(kind, term, piece);
+                for row in 0..rows {
+                    // The same accelerations come from a force at the axle and a torque on the body.
+                    let motor = kind.per_motor();
+                    if motor {
+                        loads.shafts_nm[row] += size * r1[row] * radius;
+                    } else {
+                        loads.axle_n[row] += size * r1[row];
+                        loads.body_nm[row] += size * r2[row];
+                    }
+                }
+            }
+            loads
+        };
+        self.pieces.iter().map(of_piece).collect()
+    }
+}

@@ -1,0 +1,420 @@
+//! Which of many columns a target needs: least squares with bounded nuisances, judged by leaving out blocks.
+//!
+//! Everything is computed from the Gram matrices of blocks of neighbouring rows, which one pass over the rows makes.
+//! A block is long against the memory of the residual, so that errors and intervals hold under coloured noise:
+//! nothing here takes rows for independent.
+
+use nalgebra::{DMatrix, DVector};
+
+/// Rows of one chunk, whose products stay in the cache.
+const CHUNK: usize = 256;
+/// A pivot of the scaled matrix below this is a column that depends on those before it.
+const DEPENDENT: f64 = 1e-9;
+
+/// Gram matrices of columns and target, one for each block of rows.
+#[derive(Clone, Debug)]
+pub struct Blocks {
+    /// The target is the last column.
+    blocks: Vec<DMatrix<f64>>,
+    block_rows: Vec<usize>,
+    total: DMatrix<f64>,
+    rows: usize,
+}
+
+/// A column that takes part in a fit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Member {
+    /// Which column.
+    pub column: usize,
+    /// Standard deviation of what is known of its coefficient beforehand, about 0; infinite where nothing is.
+    pub spread: f64,
+    /// Lowest and highest coefficient.
+    pub bounds: [f64; 2],
+}
+
+impl Member {
+    /// A column with any coefficient.
+    pub fn free(column: usize) -> Self {
+        Self { column, spread: f64::INFINITY, bounds: [f64::NEG_INFINITY, f64::INFINITY] }
+    }
+
+    /// A correction of a declared number that is known within ± `tolerance`.
+    pub fn within(column: usize, tolerance: f64) -> Self {
+        Self { column, spread: tolerance / 3_f64.sqrt(), bounds: [-tolerance, tolerance] }
+    }
+}
+
+/// A fit and what leaving out one block after another says of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Judged {
+    /// Coefficients of the members in their order.
+    pub coefficients: Vec<f64>,
+    /// Sum of squares that is left on the rows of the fit.
+    pub left: f64,
+    /// Sum of squares left on each block by the fit of the others.
+    pub held_out: Vec<f64>,
+    /// Covariance of the coefficients by the jackknife over blocks.
+    pub covariance: DMatrix<f64>,
+}
+
+impl Judged {
+    /// Sum of squares over all left-out blocks.
+    pub fn error(&self) -> f64 {
+        self.held_out.iter().sum()
+    }
+
+    /// Share by which the error on left-out blocks is lower than that of `other`.
+    pub fn gain_over(&self, other: &Self) -> f64 {
+        1.0 - self.error() / other.error()
+    }
+
+    /// How many standard errors the gain over `other` is above 0, from its spread over the blocks.
+    pub fn gain_z(&self, other: &Self) -> f64 {
+        let gains: Vec<f64> = other.held_out.iter().zip(&self.held_out).map(|(a, b)| a - b).collect();
+        let count = gains.len() as f64;
+        let mean = gains.iter().sum::<f64>() / count;
+        let variance = gains.iter().map(|gain| (gain - mean).powi(2)).sum::<f64>() / (count - 1.0);
+        mean / (variance / count).sqrt()
+    }
+
+    /// Length of a group's coefficients in standard errors along their own direction; `lengths` make coefficients of
+    /// different units comparable.
+    pub fn z(&self, members: std::ops::Range<usize>, lengths: &[f64]) -> f64 {
+        let scaled: Vec<f64> =
+            members.clone().zip(lengths).map(|(i, length)| self.coefficients[i] * length).collect();
+        let size = scaled.iter().map(|v| v * v).sum::<f64>().sqrt();
+        let mut variance = 0.0;
+        for (a, i) in members.clone().enumerate() {
+            for (b, j) in members.clone().enumerate() {
+                variance += scaled[a] * scaled[b] * lengths[a] * lengths[b] * self.covariance[(i, j)];
+            }
+        }
+        if size > 0.0 { size * size / variance.sqrt() } else { 0.0 }
+    }
+
+    /// Standard error of a coefficient.
+    pub fn standard_error(&self, member: usize) -> f64 {
+        self.covariance[(member, member)].max(0.0).sqrt()
+    }
+}
+
+impl Blocks {
+    /// Products of `columns` and `target`; `block` numbers the block of each row, from 0.
+    pub fn new(columns: &[&[f64]], target: &[f64], block: &[usize]) -> Self {
+        let all: Vec<&[f64]> = columns.iter().copied().chain([target]).collect();
+        let count = block.iter().max().map_or(0, |last| last + 1);
+        let mut blocks = vec![DMatrix::zeros(all.len(), all.len()); count];
+        let mut block_rows = vec![0; count];
+        let mut runs: Vec<(usize, std::ops::Range<usize>)> = Vec::new();
+        let mut start = 0;
+        for run in block.chunk_by(|a, b| a == b) {
+            runs.push((run[0], start..start + run.len()));
+            block_rows[run[0]] += run.len();
+            start += run.len();
+        }
+        pulp::Arch::new().dispatch(
+            #[inline(always)]
+            || {
+                for (block, rows) in &runs {
+                    for from in rows.clone().step_by(CHUNK) {
+                        add_products(&mut blocks[*block], &all, from..(from + CHUNK).min(rows.end));
+                    }
+                }
+            },
+        );
+        let mut total = DMatrix::zeros(all.len(), all.len());
+        for block in &mut blocks {
+            mirror(block);
+            total += &*block;
+        }
+        Self { blocks, block_rows, total, rows: target.len() }
+    }
+
+    /// Takes out of a product of two columns what noise that both have puts into it, `share` in each row.
+    pub fn discount(&mut self, a: usize, b: usize, share: f64) {
+        for (gram, rows) in self.blocks.iter_mut().zip(&self.block_rows) {
+            let noise = share * *rows as f64;
+            gram[(a, b)] -= noise;
+            self.total[(a, b)] -= noise;
+            if a != b {
+                gram[(b, a)] -= noise;
+                self.total[(b, a)] -= noise;
+            }
+        }
+    }
+
+    /// Place of the target in a product.
+    pub fn target(&self) -> usize {
+        self.total.nrows() - 1
+    }
+
+    /// Rows in all.
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Number of blocks.
+    pub fn count(&self) -> usize {
+        self.blocks.len()
+    }
+
+    /// Length of a column.
+    pub fn length(&self, column: usize) -> f64 {
+        self.total[(column, column)].sqrt()
+    }
+
+    /// Sum of squares of the target.
+    pub fn target_power(&self) -> f64 {
+        let target = self.total.nrows() - 1;
+        self.total[(target, target)]
+    }
+
+    /// The fit of all rows; nothing where the members depend on each other. `noise` is the variance of a row, against
+    /// which what is known beforehand is weighed.
+    pub fn fit(&self, members: &[Member], noise: f64) -> Option<Vec<f64>> {
+        fit(&self.total, members, noise)
+    }
+
+    /// Sum of squares that coefficients leave on all rows.
+    pub fn left(&self, members: &[Member], coefficients: &[f64]) -> f64 {
+        left(&self.total, members, coefficients)
+    }
+
+    /// The fit, judged by leaving out one block after another; nothing where the members depend on each other, in all
+    /// rows or without a block.
+    pub fn judge(&self, members: &[Member], noise: f64) -> Option<Judged> {
+        let coefficients = self.fit(members, noise)?;
+        let count = self.blocks.len() as f64;
+        let mut held_out = Vec::with_capacity(self.blocks.len());
+        let mut covariance = DMatrix::zeros(members.len(), members.len());
+        for block in &self.blocks {
+            let others = fit(&(&self.total - block), members, noise)?;
+            held_out.push(left(block, members, &others));
+            let shift =
+                DVector::from_iterator(members.len(), others.iter().zip(&coefficients).map(|(a, b)| a - b));
+            covariance.ger((count - 1.0) / count, &shift, &shift, 1.0);
+        }
+        let left = left(&self.total, members, &coefficients);
+        Some(Judged { coefficients, left, held_out, covariance })
+    }
+
+    /// Share of one combination of columns (what an effect does) that other columns can say instead, with the nuisances
+    /// taken out of both: the squared cosine.
+    pub fn overlap(&self, nuisances: &[Member], noise: f64, one: &[(usize, f64)], other: &[usize]) -> f64 {
+        let others: Vec<Member> =
+            nuisances.iter().copied().chain(other.iter().map(|&column| Member::free(column))).collect();
+        match (self.power_beyond(nuisances, noise, one), self.power_beyond(&others, noise, one)) {
+            (Some(alone), Some(with)) if alone > 0.0 => (1.0 - with / alone).clamp(0.0, 1.0),
+            _ => 0.0,
+        }
+    }
+
+    /// Sum of squares of a combination of columns that members cannot say.
+    pub fn power_beyond(&self, members: &[Member], noise: f64, one: &[(usize, f64)]) -> Option<f64> {
+        let inner =
+            |a: usize| one.iter().map(|&(column, share)| share * self.total[(column, a)]).sum::<f64>();
+        let right = DVector::from_iterator(members.len(), members.iter().map(|member| inner(member.column)));
+        let own: f64 = one.iter().map(|&(column, share)| share * inner(column)).sum();
+        let said = if members.is_empty() {
+            0.0
+        } else {
+            solve(normal(&self.total, members, noise), &right)?.dot(&right)
+        };
+        Some(own - said)
+    }
+}
+
+/// Normal equations of some members, with what is known of them.
+fn normal(gram: &DMatrix<f64>, members: &[Member], noise: f64) -> DMatrix<f64> {
+    DMatrix::from_fn(members.len(), members.len(), |i, j| {
+        let known = if i == j { noise / (members[i].spread * members[i].spread) } else { 0.0 };
+        gram[(members[i].column, members[j].column)] + known
+    })
+}
+
+/// Adds the products of some rows to the lower triangle.
+#[inline(always)]
+fn add_products(gram: &mut DMatrix<f64>, columns: &[&[f64]], rows: std::ops::Range<usize>) {
+    for (j, right) in columns.iter().enumerate() {
+        let right = &right[rows.clone()];
+        for (i, left) in columns.iter().enumerate().skip(j) {
+            gram[(i, j)] += dot(&left[rows.clone()], right);
+        }
+    }
+}
+
+/// Sums side by side, which the compiler turns into vectors.
+#[inline(always)]
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    const LANES: usize = 16;
+    let (mut sums, cut) = ([0.0; LANES], a.len() / LANES * LANES);
+    for (a, b) in a[..cut].chunks_exact(LANES).zip(b[..cut].chunks_exact(LANES)) {
+        for ((sum, a), b) in sums.iter_mut().zip(a).zip(b) {
+            *sum += a * b;
+        }
+    }
+    let rest: f64 = a[cut..].iter().zip(&b[cut..]).map(|(a, b)| a * b).sum();
+    sums.iter().sum::<f64>() + rest
+}
+
+fn mirror(gram: &mut DMatrix<f64>) {
+    for j in 0..gram.ncols() {
+        for i in 0..j {
+            gram[(i, j)] = gram[(j, i)];
+        }
+    }
+}
+
+/// Least squares within bounds: whatever breaks its bound most is held there, and the others are solved for anew.
+fn fit(gram: &DMatrix<f64>, members: &[Member], noise: f64) -> Option<Vec<f64>> {
+    let target = gram.nrows() - 1;
+    let mut values = vec![0.0; members.len()];
+    let mut free: Vec<usize> = (0..members.len()).collect();
+    loop {
+        let size = free.len();
+        let chosen: Vec<Member> = free.iter().map(|&member| members[member]).collect();
+        let held = |column: usize| -> f64 {
+            let others = (0..members.len()).filter(|member| !free.contains(member));
+            others.map(|other| values[other] * gram[(members[other].column, column)]).sum()
+        };
+        let right = DVector::from_iterator(
+            size,
+            free.iter().map(|&i| gram[(members[i].column, target)] - held(members[i].column)),
+        );
+        let solution = if size == 0 { right } else { solve(normal(gram, &chosen, noise), &right)? };
+        free.iter().zip(&solution).for_each(|(&member, value)| values[member] = *value);
+        let beyond = |member: usize| {
+            let [low, high] = members[member].bounds;
+            let over = (values[member] - high).max(low - values[member]);
+            if over > 0.0 { over / (high - low).max(1e-300) } else { 0.0 }
+        };
+        let worst = free.iter().copied().max_by(|&a, &b| beyond(a).total_cmp(&beyond(b)));
+        match worst.filter(|&member| beyond(member) > 0.0) {
+            None => return Some(values),
+            Some(member) => {
+                let [low, high] = members[member].bounds;
+                values[member] = values[member].clamp(low, high);
+                free.retain(|&other| other != member);
+            }
+        }
+    }
+}
+
+fn left(gram: &DMatrix<f64>, members: &[Member], values: &[f64]) -> f64 {
+    let target = gram.nrows() - 1;
+    let mut sum = gram[(target, target)];
+    for (a, value) in members.iter().zip(values) {
+        sum -= 2.0 * value * gram[(a.column, target)];
+        for (b, other) in members.iter().zip(values) {
+            sum += value * other * gram[(a.column, b.column)];
+        }
+    }
+    sum.max(0.0)
+}
+
+/// Solves with the matrix scaled to a diagonal of 1; nothing where it is singular.
+fn solve(mut matrix: DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
+    let scale = matrix.diagonal().map(|value| 1.0 / value.sqrt());
+    if !scale.iter().all(|value| value.is_finite()) {
+        return None;
+    }
+    for j in 0..matrix.ncols() {
+        for i in 0..matrix.nrows() {
+            matrix[(i, j)] *= scale[i] * scale[j];
+        }
+    }
+    let factors = matrix.cholesky()?;
+    if factors.l_dirty().diagonal().iter().any(|&pivot| pivot * pivot < DEPENDENT) {
+        return None;
+    }
+    Some(factors.solve(&right.component_mul(&scale)).component_mul(&scale))
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+
+    fn columns(seed: u64, rows: usize) -> (Vec<Vec<f64>>, Vec<usize>) {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut uniform = || f64::from(random.next_u32()) / f64::from(u32::MAX) - 0.5;
+        let columns = (0..4).map(|_| (0..rows).map(|_| uniform()).collect()).collect();
+        (columns, (0..rows).map(|row| row * 10 / rows).collect())
+    }
+
+    fn target(columns: &[Vec<f64>], noise: f64) -> Vec<f64> {
+        (0..columns[0].len())
+            .map(|row| 2.0 * columns[0][row] - columns[1][row] + noise * columns[3][row])
+            .collect()
+    }
+
+    fn blocks(columns: &[Vec<f64>], target: &[f64], block: &[usize]) -> Blocks {
+        let views: Vec<&[f64]> = columns[..3].iter().map(Vec::as_slice).collect();
+        Blocks::new(&views, target, block)
+    }
+
+    #[test]
+    fn coefficients_errors_and_intervals_are_those_of_the_rows() {
+        let (columns, block) = columns(1, 5003);
+        let target = target(&columns, 0.3);
+        let blocks = blocks(&columns, &target, &block);
+        let members = [Member::free(0), Member::free(1)];
+        let judged = blocks.judge(&members, 1.0).unwrap();
+        let left: f64 = (0..target.len())
+            .map(|row| {
+                target[row]
+                    - judged.coefficients[0] * columns[0][row]
+                    - judged.coefficients[1] * columns[1][row]
+            })
+            .map(|r| r * r)
+            .sum();
+        assert!((judged.left / left - 1.0).abs() < 1e-9);
+        // Uniform noise of variance 0.3²/12 on columns of variance 1/12.
+        let expected = 0.3 / (5003_f64).sqrt();
+        for member in 0..2 {
+            assert!((judged.coefficients[member] - [2.0, -1.0][member]).abs() < 4.0 * expected);
+            assert!((0.4..2.0).contains(&(judged.standard_error(member) / expected)));
+        }
+        let less = blocks.judge(&members[..1], 1.0).unwrap();
+        assert!(judged.gain_over(&less) > 0.9 && judged.gain_z(&less) > 5.0);
+        assert!(judged.z(1..2, &[blocks.length(1)]) > 50.0);
+    }
+
+    #[test]
+    fn bounds_and_tolerances_hold() {
+        let (columns, block) = columns(2, 2000);
+        let target = target(&columns, 0.1);
+        let blocks = blocks(&columns, &target, &block);
+        let bounded = Member { bounds: [-3.0, 1.5], ..Member::free(0) };
+        let found = blocks.fit(&[bounded, Member::free(1)], 0.01).unwrap();
+        assert_eq!(found[0], 1.5);
+        // A number that is known within a hundredth moves no further.
+        let found = blocks.fit(&[Member::within(0, 0.01), Member::free(1)], 0.01).unwrap();
+        assert_eq!(found[0], 0.01);
+        assert!(blocks.fit(&[Member::free(0), Member::free(0)], 0.01).is_none());
+    }
+
+    #[test]
+    fn overlap_is_the_squared_cosine_beyond_the_nuisances() {
+        let (mut columns, block) = columns(3, 4000);
+        // Half of column 2 is column 0, which is a nuisance, and half of the rest is column 1.
+        columns[2] = (0..4000).map(|row| columns[0][row] + columns[1][row] + columns[3][row]).collect();
+        let blocks = blocks(&columns, &vec![0.0; 4000], &block);
+        let overlap = blocks.overlap(&[Member::free(0)], 1.0, &[(1, 3.0)], &[2]);
+        assert!((overlap - 0.5).abs() < 0.05, "{overlap}");
+    }
+
+    #[test]
+    fn noise_that_is_taken_out_no_longer_lowers_a_coefficient() {
+        let (columns, block) = columns(4, 20_000);
+        // Column 2 is column 0 with noise of the same variance, 1/12.
+        let noisy: Vec<f64> = columns[0].iter().zip(&columns[3]).map(|(a, b)| a + b).collect();
+        let mut blocks = Blocks::new(&[&noisy], &columns[0], &block);
+        let attenuated = blocks.fit(&[Member::free(0)], 1.0).unwrap()[0];
+        blocks.discount(0, 0, 1.0 / 12.0);
+        let mended = blocks.fit(&[Member::free(0)], 1.0).unwrap()[0];
+        assert!((attenuated - 0.5).abs() < 0.02 && (mended - 1.0).abs() < 0.05, "{attenuated} {mended}");
+    }
+}
