@@ -95,7 +95,10 @@ pub(super) fn refine(
     let white = White::new(&rows, &whitener, &nuisances, [&measured, &target], declared.inertia);
     let wanted: Vec<f64> = measured.iter().zip(&target).map(|(measured, left)| measured - left).collect();
     let scales = Scales::new(&rows, declared.inertia);
-    let library = library(&declared.machine, &rows, &whitener, &scales, (&wanted, declared.inertia));
+    let mut library = library(&declared.machine, &rows, &whitener, &scales, (&wanted, declared.inertia));
+    // What is free already is no effect that the model lacks.
+    library
+        .retain(|candidate| !nuisances.iter().any(|known| known.free && known.effect == candidate.kind.id));
     let mut search =
         Search::new(&rows, &declared.machine, &nuisances, &target, (&whitener, &white, &library));
     let Some(first) = search.fit(&[]) else {

@@ -28,7 +28,7 @@ impl Default for Tolerances {
 /// Share of the Coulomb level that an offset may be off by, beside its own tolerance.
 const OFFSET_OF_COULOMB: f64 = 0.01;
 /// How far a free inertia may be from the declared one, as a share of it.
-const FREE_INERTIA: [f64; 2] = [-0.7, 9.0];
+const FREE_INERTIA: [f64; 2] = [-0.99, 99.0];
 /// A sampled torque may act anywhere between its own row and the next.
 const TIMING_ROWS: f64 = 0.5;
 
