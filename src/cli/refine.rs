@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use clap::Args;
-use flqr_core::refine::{self, Refinement, Verdict};
+use flqr_core::refine::{self, Fate, Refinement, Verdict};
 
 use super::output::{Failure, Output, complain, number};
 use super::progress::Progress;
@@ -54,6 +54,9 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     output.result(&found, |out| print(out, &found))
 }
 
+/// Most lines about what was tried and not added.
+const MOST_LOST: usize = 8;
+
 fn print(out: &mut dyn Write, found: &Refinement) -> io::Result<()> {
     let verdict = match found.verdict {
         Verdict::ModelAdequate => "model adequate: no effect of the library explains the log better",
@@ -77,13 +80,21 @@ fn print(out: &mut dyn Write, found: &Refinement) -> io::Result<()> {
             writeln!(out, "  not told from {} by this log", others.join(", "))?;
         }
     }
+    let lost = found.candidates.iter().filter(|tried| tried.fate != Fate::Added);
+    for (n, tried) in lost.take(MOST_LOST).enumerate() {
+        if n == 0 {
+            writeln!(out, "\n{:45}{:>14}", "tried, not added", "error lower by")?;
+        }
+        let name = format!("{} {}", tried.kind.id, tried.detail);
+        writeln!(out, "{:45}{:>12.1} %   {}", name.trim(), tried.gain_percent, tried.fate)?;
+    }
     writeln!(out)?;
     print_errors(out, &[("before", &found.before), ("after", &found.after)])?;
     if !found.unexplained.description.is_empty() {
         writeln!(out, "unexplained: {}", found.unexplained.description)?;
     }
     if let Some(next) = &found.next_experiment {
-        writeln!(out, "next experiment: {next}")?;
+        writeln!(out, "next experiment: {}", next.summary)?;
     }
     print_health(out, &found.data_health)
 }

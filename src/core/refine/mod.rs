@@ -15,7 +15,10 @@
 //!    better than the library does has no name: `unexplained_residual`.
 
 mod axis;
+mod closed_loop;
 mod error;
+mod explorer;
+mod next_experiment;
 mod pages;
 mod robot;
 pub mod select;
@@ -28,10 +31,13 @@ use crate::model_file::{AxisParameters, Model, Rig};
 use crate::record::{Log, LogKind};
 use crate::robot::Motor;
 
+pub use closed_loop::{ClosedLoop, Fed, LimitCycle, LoopPair, LoopRun, Spread};
 pub use error::RefineError;
+pub use explorer::{Explorer, Variable};
+pub use next_experiment::NextExperiment;
 pub use verdict::{
-    Channels, Corrected, Errors, Found, Prediction, Quantity, Refinement, Residual, Sized, Test, Unexplained,
-    Verdict,
+    Channels, Corrected, Errors, Fate, Found, Prediction, Quantity, Refinement, Residual, Sized, Test, Tried,
+    Unexplained, Verdict,
 };
 
 /// How a model is refined.
@@ -81,10 +87,15 @@ pub fn refine(
     if !held_out.is_empty() {
         kind_of(model, held_out)?;
     }
-    match kind {
+    let mut found = match kind {
         LogKind::Robot => robot::refine(model, logs, held_out, options, watch),
         _ => axis::refine(model, logs, held_out, options, watch),
+    }?;
+    if found.verdict != Verdict::DataUnfit {
+        found.next_experiment = next_experiment::in_words(&found.effects, &found.unexplained);
     }
+    found.document = pages::document(&found, logs);
+    Ok(found)
 }
 
 /// What all of the logs hold, as far as the model describes it: a log may serve several kinds.

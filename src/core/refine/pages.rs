@@ -3,32 +3,14 @@
 use crate::record::{Log, Severity};
 use crate::report::{Axis, Block, Cell, Chart, Column, Document, Mark, Panel, Series, Table, Tone};
 
+use super::explorer::{Explorer, Variable};
 use super::verdict::{Errors, Refinement, Verdict};
-
-/// Names and units of what a machine has.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Words {
-    pub(super) effort: &'static str,
-    pub(super) effort_unit: &'static str,
-    pub(super) position: (&'static str, &'static str),
-    pub(super) speed: (&'static str, &'static str),
-}
-
-/// The residual at the held-out rows.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Figures {
-    pub(super) time_s: Vec<f64>,
-    pub(super) position: Vec<f64>,
-    pub(super) speed: Vec<f64>,
-    pub(super) before: Vec<f64>,
-    pub(super) after: Vec<f64>,
-}
 
 /// Bins of the pictures over a variable.
 const BINS: usize = 90;
 
 /// The report.
-pub(super) fn document(found: &Refinement, logs: &[Log], figures: &Figures, words: Words) -> Document {
+pub(super) fn document(found: &Refinement, logs: &[Log]) -> Document {
     let mut blocks = vec![verdict(found)];
     blocks.push(Block::section("Effects"));
     if found.effects.is_empty() {
@@ -47,11 +29,11 @@ pub(super) fn document(found: &Refinement, logs: &[Log], figures: &Figures, word
         blocks.push(Block::notice(Tone::Warning, "Unexplained", found.unexplained.description.clone()));
     }
     if let Some(next) = &found.next_experiment {
-        blocks.push(Block::notice(Tone::Note, "Next experiment", next.clone()));
+        blocks.push(Block::notice(Tone::Note, "Next experiment", next.summary.clone()));
     }
     blocks.push(Block::section("Error before and after"));
     blocks.push(Block::Table(errors(found)));
-    blocks.extend(pictures(figures, words).into_iter().map(Block::Figure));
+    blocks.extend(pictures(&found.explorer).into_iter().map(Block::Figure));
     blocks.push(Block::section("Declared numbers as this log has them"));
     blocks.push(Block::Table(parameters(found)));
     blocks.push(Block::section("Data"));
@@ -194,40 +176,44 @@ fn parameters(found: &Refinement) -> Table {
     }
 }
 
-fn pictures(figures: &Figures, words: Words) -> Vec<Chart> {
-    let residual = |unit| Axis::new(format!("{} residual", words.effort), unit);
-    let over = |title: &str, x: Axis, values: &[f64]| Chart {
-        title: title.to_owned(),
-        description: "Mean residual in bins on held-out rows, before and after.".to_owned(),
-        x,
+fn pictures(explorer: &Explorer) -> Vec<Chart> {
+    explorer.variables.iter().map(|variable| picture(explorer, variable)).collect()
+}
+
+/// The residual over a variable; over time as it is, over others as means in bins.
+fn picture(explorer: &Explorer, variable: &Variable) -> Chart {
+    let in_time = variable.name == "time_s";
+    let held = |values: &[f64]| -> Vec<f64> {
+        values.iter().zip(&explorer.held_out).filter(|(_, held)| **held).map(|(value, _)| *value).collect()
+    };
+    let values = held(&variable.values);
+    let in_a_turn: Vec<f64> = if variable.name == "motor_angle_rad" {
+        values.iter().map(|angle| angle.rem_euclid(std::f64::consts::TAU)).collect()
+    } else {
+        values
+    };
+    let series = |name: &str, residual: &[f64], mark: Mark| {
+        let residual = held(residual);
+        let points: Vec<[f64; 2]> = if in_time {
+            in_a_turn.iter().zip(&residual).map(|(x, y)| [*x, *y]).collect()
+        } else {
+            binned(&in_a_turn, &residual)
+        };
+        Series::new(name, if in_time { Mark::Scatter } else { mark }, points)
+    };
+    Chart {
+        title: format!("Residual over {}", variable.name),
+        description: "Residual on held-out rows, before and after; means in bins, over time as it is."
+            .to_owned(),
+        x: Axis::new(variable.name, variable.unit),
         panels: vec![Panel::new(
-            residual(words.effort_unit),
+            Axis::new(format!("Residual of {}", explorer.channel), explorer.unit),
             vec![
-                Series::new("before", Mark::Dashed, binned(values, &figures.before)),
-                Series::new("after", Mark::Line, binned(values, &figures.after)),
+                series("before", &explorer.before, Mark::Dashed),
+                series("after", &explorer.after, Mark::Line),
             ],
         )],
-    };
-    let time = |values: &[f64]| -> Vec<[f64; 2]> {
-        figures.time_s.iter().zip(values).map(|(t, v)| [*t, *v]).collect()
-    };
-    let in_time = Chart {
-        title: "Residual in time".to_owned(),
-        description: "Residual at the held-out rows, before and after.".to_owned(),
-        x: Axis::new("Time", "s"),
-        panels: vec![Panel::new(
-            residual(words.effort_unit),
-            vec![
-                Series::new("before", Mark::Scatter, time(&figures.before)),
-                Series::new("after", Mark::Scatter, time(&figures.after)),
-            ],
-        )],
-    };
-    vec![
-        in_time,
-        over("Residual over position", Axis::new(words.position.0, words.position.1), &figures.position),
-        over("Residual over speed", Axis::new(words.speed.0, words.speed.1), &figures.speed),
-    ]
+    }
 }
 
 /// Means of `values` in bins of `over` with the same number of rows.

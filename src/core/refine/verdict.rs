@@ -7,6 +7,10 @@ use crate::model_file::Model;
 use crate::record::HealthFinding;
 use crate::report::Document;
 
+use super::closed_loop::ClosedLoop;
+use super::explorer::Explorer;
+use super::next_experiment::NextExperiment;
+
 /// The answer in one word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -28,6 +32,16 @@ pub struct Quantity {
     pub value: f64,
     /// As text.
     pub unit: &'static str,
+    /// 95 % interval, by blocks of the rows; none where there was no asking for it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ci95: Option<[f64; 2]>,
+}
+
+impl Quantity {
+    /// A number without an interval.
+    pub fn new(value: f64, unit: &'static str) -> Self {
+        Self { value, unit, ci95: None }
+    }
 }
 
 /// One value for each channel, the main one first.
@@ -50,12 +64,16 @@ impl Serialize for Channels {
 /// How far a model's motion runs away from the log's over a short time.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Prediction {
+    /// What is predicted, named as a log's column.
+    pub variable: &'static str,
     /// Length of the prediction, s.
     pub horizon_s: f64,
     /// Root mean square of the error at its end.
     pub rmse: Quantity,
     /// Root mean square of the motion itself over that time.
     pub motion: Quantity,
+    /// What noise of the sensors alone makes of the error.
+    pub noise_floor: Quantity,
 }
 
 /// How far a model is from a log.
@@ -162,6 +180,81 @@ pub struct Unexplained {
     pub description: String,
 }
 
+/// What became of something that was tried.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Fate {
+    /// It is in the refined model.
+    Added,
+    /// It does as well as what was added, and this log cannot tell them apart.
+    NotToldFrom(&'static EffectKind),
+    /// Nothing is left for it beside what was added.
+    Explained,
+    /// It explains something, and too little for a name.
+    TooSmall,
+    /// Its size is not surely other than 0.
+    NotSure,
+    /// The log does not excite it: declared numbers within their tolerances say nearly all that it would.
+    NotTestable,
+}
+
+impl Fate {
+    /// One word for scripts.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Added => "added",
+            Self::NotToldFrom(_) => "not_told_from",
+            Self::Explained => "explained",
+            Self::TooSmall => "too_small",
+            Self::NotSure => "not_sure",
+            Self::NotTestable => "not_testable",
+        }
+    }
+}
+
+impl std::fmt::Display for Fate {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Added => f.write_str("added"),
+            Self::NotToldFrom(kind) => write!(f, "not told from {}", kind.id),
+            Self::Explained => f.write_str("nothing left for it beside what was added"),
+            Self::TooSmall => f.write_str("explains too little"),
+            Self::NotSure => f.write_str("its size is not sure"),
+            Self::NotTestable => f.write_str("this log does not excite it"),
+        }
+    }
+}
+
+/// One thing that was tried.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tried {
+    /// The effect.
+    pub kind: &'static EffectKind,
+    /// Its shape in words, as `order 14` or `5.0 ms`; may be empty.
+    pub detail: String,
+    /// By how much the error on left-out blocks is lower with it alone beside the declared model, in percent.
+    pub gain_percent: f64,
+    /// Standard errors of its size above 0, by the jackknife over blocks.
+    pub z: f64,
+    /// What became of it.
+    pub fate: Fate,
+}
+
+impl Serialize for Tried {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        use serde::ser::SerializeMap;
+        let mut map = serializer.serialize_map(None)?;
+        map.serialize_entry("id", self.kind.id)?;
+        map.serialize_entry("detail", &self.detail)?;
+        map.serialize_entry("gain_percent", &self.gain_percent)?;
+        map.serialize_entry("z", &self.z)?;
+        map.serialize_entry("fate", self.fate.name())?;
+        if let Fate::NotToldFrom(kind) = self.fate {
+            map.serialize_entry("not_told_from", kind.id)?;
+        }
+        map.end()
+    }
+}
+
 /// A declared number that was estimated along.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Corrected {
@@ -188,8 +281,13 @@ pub struct Refinement {
     pub after: Errors,
     /// What remains.
     pub unexplained: Unexplained,
+    /// What was tried, best first.
+    pub candidates: Vec<Tried>,
+    /// The refined model as the plant under the controllers of before and after; none for an axis, and where the model
+    /// stays as it was.
+    pub closed_loop: Option<ClosedLoop>,
     /// What to record next, where it would tell more.
-    pub next_experiment: Option<String>,
+    pub next_experiment: Option<NextExperiment>,
     /// What is wrong with the logs.
     pub data_health: Vec<HealthFinding>,
     /// Declared numbers as this log has them.
@@ -197,6 +295,9 @@ pub struct Refinement {
     /// The model with all of it.
     #[serde(skip)]
     pub model: Model,
+    /// The residual row by row.
+    #[serde(skip)]
+    pub explorer: Explorer,
     /// Tables and figures.
     #[serde(skip)]
     pub document: Document,

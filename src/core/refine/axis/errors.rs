@@ -13,7 +13,7 @@ pub(super) fn errors(declared: &Declared, rows: &Rows, measured: &[f64], left: &
         let (sum, count) = held_out.fold((0.0, 0_usize), |(sum, count), (_, v)| (sum + v * v, count + 1));
         (sum / count.max(1) as f64).sqrt()
     };
-    let channel = |value: f64, unit| Channels(vec![(declared.channel(), Quantity { value, unit })]);
+    let channel = |value: f64, unit| Channels(vec![(declared.channel(), Quantity::new(value, unit))]);
     Errors {
         rmse: channel(rms(left), unit),
         noise_floor: channel(noise_floor(declared, rows), unit),
@@ -23,7 +23,7 @@ pub(super) fn errors(declared: &Declared, rows: &Rows, measured: &[f64], left: &
 }
 
 /// What white noise of position and effort leaves behind the kernel.
-fn noise_floor(declared: &Declared, rows: &Rows) -> f64 {
+pub(super) fn noise_floor(declared: &Declared, rows: &Rows) -> f64 {
     let kernel = &rows.kernel;
     let acceleration = rows.position_noise * kernel.noise_gain(2) * declared.inertia.powi(2);
     (acceleration + rows.effort_noise * kernel.noise_gain(0)).sqrt()

@@ -19,7 +19,7 @@ use crate::robot::Motor;
 
 use super::error::RefineError;
 use super::verdict::{Corrected, Errors, Found, Refinement, Residual, Unexplained, Verdict};
-use super::{Options, pages};
+use super::{Explorer, NextExperiment, Options};
 use candidates::{Scales, library};
 use errors::errors;
 use leftover::{Dependence, Variable};
@@ -132,8 +132,8 @@ pub(super) fn refine(
         (true, true) => Verdict::ModelAdequate,
     };
     let values: Vec<(&'static str, f64)> = corrections.iter().map(|c| (c.key, c.value)).collect();
-    let next_experiment = next_experiment(&effects);
-    let mut refinement = Refinement {
+    let explorer = explorer(&declared, &rows, &measured, [&before_left, &left]);
+    Ok(Refinement {
         verdict,
         model: refined_model(
             declared.corrected_model(model, options.motor, &values),
@@ -144,14 +144,14 @@ pub(super) fn refine(
         before,
         after,
         unexplained: unexplained(&declared, &structure),
-        next_experiment,
+        candidates: Vec::new(),
+        closed_loop: None,
+        next_experiment: None,
         data_health,
         parameters: corrections,
+        explorer,
         document: Default::default(),
-    };
-    let figures = figures(&declared, &rows, &before_left, &left);
-    refinement.document = pages::document(&refinement, logs, &figures, declared.words());
-    Ok(refinement)
+    })
 }
 
 /// The model with effects: those that are errors of its numbers put right there, the others added.
@@ -178,23 +178,31 @@ fn refined_model(mut model: Model, motor: Motor, effects: &[Found]) -> Model {
     model
 }
 
-/// The residual at the held-out rows, as pictures take it.
-fn figures(declared: &Declared, rows: &Rows, before: &[f64], after: &[f64]) -> pages::Figures {
-    let mut figures = pages::Figures::default();
-    for (index, row) in rows.rows.iter().enumerate().filter(|(_, row)| row.part == trace::Part::HeldOut) {
-        let trace = &rows.traces[row.trace];
-        let position = trace.position[row.sample];
-        figures.time_s.push(row.time_s);
-        figures.position.push(if declared.is_linear() {
-            position
-        } else {
-            position.rem_euclid(std::f64::consts::TAU)
-        });
-        figures.speed.push(trace.speed[row.sample]);
-        figures.before.push(before[index]);
-        figures.after.push(after[index]);
+/// The residual at every row.
+fn explorer(declared: &Declared, rows: &Rows, measured: &[f64], [before, after]: [&Vec<f64>; 2]) -> Explorer {
+    let at = |of: fn(&trace::Trace) -> &Vec<f64>| -> Vec<f64> {
+        rows.rows.iter().map(|row| of(&rows.traces[row.trace])[row.sample]).collect()
+    };
+    let position = at(|trace| &trace.position);
+    let angle = (!declared.is_linear()).then(|| position.clone());
+    Explorer {
+        channel: declared.channel(),
+        variables: declared.variables(
+            rows.rows.iter().map(|row| row.time_s).collect(),
+            position,
+            at(|trace| &trace.speed),
+            at(|trace| &trace.acceleration),
+            at(|trace| &trace.effort),
+        ),
+        held_out: rows.rows.iter().map(|row| row.part == trace::Part::HeldOut).collect(),
+        measured: measured.to_vec(),
+        before: before.clone(),
+        after: after.clone(),
+        unit: declared.effort_unit(),
+        noise_floor: errors::noise_floor(declared, rows),
+        orders: Vec::new(),
     }
-    figures
+    .finished(angle.as_deref())
 }
 
 /// Whether a smooth function of one variable explains the residual so much better than the effects do that their names
@@ -227,10 +235,13 @@ fn unfit_refinement(model: &Model, data_health: Vec<HealthFinding>) -> Refinemen
         before: Errors::default(),
         after: Errors::default(),
         unexplained: Unexplained::default(),
-        next_experiment: data_health.first().map(|finding| finding.mend.clone()),
+        candidates: Vec::new(),
+        closed_loop: None,
+        next_experiment: data_health.first().map(|finding| NextExperiment::in_words(finding.mend.clone())),
         data_health,
         parameters: Vec::new(),
         model: model.clone(),
+        explorer: Explorer::default(),
         document: Default::default(),
     }
 }
@@ -265,16 +276,6 @@ fn corrections(nuisances: &[Nuisance], fit: &Fit) -> Vec<Corrected> {
         }
     };
     nuisances.iter().enumerate().filter(|(_, nuisance)| !nuisance.key.is_empty()).map(corrected).collect()
-}
-
-fn next_experiment(effects: &[Found]) -> Option<String> {
-    let ambiguous = effects.iter().find(|found| !found.ambiguous_with.is_empty())?;
-    Some(format!(
-        "to tell {} from {}: {}",
-        ambiguous.effect.id(),
-        ambiguous.ambiguous_with.iter().map(|kind| kind.id).collect::<Vec<_>>().join(", "),
-        ambiguous.effect.kind().separated_by
-    ))
 }
 
 /// Picks of one kind are one effect, the strongest harmonics first.

@@ -3,8 +3,8 @@
 use crate::effects::{Effect, Machine, MachineKind, Place};
 use crate::friction::{Stribeck, StribeckParameters};
 use crate::model_file::{AxisParameters, Model, Rig};
+use crate::refine::Variable;
 use crate::refine::error::RefineError;
-use crate::refine::pages::Words;
 use crate::robot::Motor;
 
 use super::trace::{Names, Rows, Trace};
@@ -126,17 +126,28 @@ impl Declared {
     }
 
     /// How a report names things.
-    pub(super) fn words(&self) -> Words {
-        if self.is_linear() {
-            Words { effort: "Force", effort_unit: "N", position: ("Position", "m"), speed: ("Speed", "m/s") }
+    /// Columns as what a residual may depend on.
+    pub(super) fn variables(
+        &self,
+        time_s: Vec<f64>,
+        position: Vec<f64>,
+        speed: Vec<f64>,
+        acceleration: Vec<f64>,
+        effort: Vec<f64>,
+    ) -> Vec<Variable> {
+        let names = self.names();
+        let (units, acceleration_name) = if self.is_linear() {
+            (["m", "m/s", "m/s²", "N"], "acceleration_m_s2")
         } else {
-            Words {
-                effort: "Torque",
-                effort_unit: "N m",
-                position: ("Angle in a turn", "rad"),
-                speed: ("Speed", "rad/s"),
-            }
-        }
+            (["rad", "rad/s", "rad/s²", "N m"], "motor_acceleration_rad_s2")
+        };
+        vec![
+            Variable::new("time_s", "s", time_s),
+            Variable::new(names.position, units[0], position),
+            Variable::new(names.speed, units[1], speed),
+            Variable::new(names.effort, units[3], effort),
+            Variable::new(acceleration_name, units[2], acceleration),
+        ]
     }
 
     pub(super) fn channel(&self) -> &'static str {

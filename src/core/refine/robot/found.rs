@@ -4,7 +4,7 @@ use crate::effects::{Effect, EffectKind, KINDS, MachineKind, Role, Term};
 use crate::friction::{Stribeck, StribeckParameters};
 use crate::identify::quantile::student_t_975;
 use crate::model_file::{Model, Rig};
-use crate::refine::verdict::{Corrected, Found, Unexplained};
+use crate::refine::verdict::{Corrected, Found};
 
 use super::candidates::Candidate;
 use super::motion::Readings;
@@ -201,27 +201,6 @@ pub(super) fn refined(
     robot.effects.extend(effects.iter().map(|found| found.effect.clone()));
     **robot = robot.with_effects_declared();
     model
-}
-
-/// What to record next.
-pub(super) fn next_experiment(effects: &[Found], left: Option<&Unexplained>) -> Option<String> {
-    if let Some(found) = effects.iter().find(|found| !found.ambiguous_with.is_empty()) {
-        let others: Vec<&str> = found.ambiguous_with.iter().map(|kind| kind.id).collect();
-        return Some(format!(
-            "to tell {} from {}: {}",
-            found.effect.id(),
-            others.join(", "),
-            found.effect.kind().separated_by
-        ));
-    }
-    left.map(|left| match left.depends_on.first().map(String::as_str) {
-        Some("time_s") | None => {
-            "the same run again, to see whether it comes back at the same time".to_owned()
-        }
-        Some(variable) => {
-            format!("a run in which {variable} varies while all else is kept as even as can be")
-        }
-    })
 }
 
 /// The gyro's bias, from the pitch that it should add up to.

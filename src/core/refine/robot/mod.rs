@@ -21,6 +21,7 @@ mod trace;
 
 use std::ops::ControlFlow;
 
+use crate::effects::Moment;
 use crate::identify::quantile::student_t_975;
 use crate::model_file::{Model, RobotModel};
 use crate::record::{HealthFinding, Log, LogKind, Severity};
@@ -29,7 +30,7 @@ use super::error::RefineError;
 use super::verdict::{
     Channels as PerChannel, Corrected, Errors, Found, Quantity, Refinement, Residual, Unexplained, Verdict,
 };
-use super::{Options, pages};
+use super::{Explorer, NextExperiment, Options, Variable};
 use candidates::library;
 use channels::Channels;
 use motion::Readings;
@@ -117,7 +118,7 @@ pub(super) fn refine(
         let Some(fit) = search.fit(&search.picks) else { return Ok(unfit(model, data_health)) };
         let last = pass == 1 || search.picks.is_empty();
         if last {
-            return Ok(answer(model, logs, &search, &fit, biases, data_health));
+            return Ok(answer(model, &search, &fit, biases, data_health));
         }
         let left = search.left_raw(&search.picks, &fit.judged.coefficients);
         let loads = trace.loads(&found::laws(&search, &fit));
@@ -143,17 +144,19 @@ fn unfit(model: &Model, data_health: Vec<HealthFinding>) -> Refinement {
         before: Errors::default(),
         after: Errors::default(),
         unexplained: Unexplained::default(),
-        next_experiment: worst.map(|finding| finding.mend.clone()),
+        candidates: Vec::new(),
+        closed_loop: None,
+        next_experiment: worst.map(|finding| NextExperiment::in_words(finding.mend.clone())),
         data_health,
         parameters: Vec::new(),
         model: model.clone(),
+        explorer: Explorer::default(),
         document: Default::default(),
     }
 }
 
 fn answer(
     model: &Model,
-    logs: &[Log],
     search: &Search<'_>,
     fit: &Fit,
     biases: Vec<Found>,
@@ -182,45 +185,55 @@ fn answer(
     };
     let parameters = corrections(search.nuisances, used);
     let refined = found::refined(model, search, picks, used, &effects, &parameters);
-    let mut refinement = Refinement {
+    let explorer = explorer(search, &left_before, &left_after);
+    Refinement {
         verdict,
-        next_experiment: found::next_experiment(&effects, structure.as_ref()),
         effects,
         before,
         after,
         unexplained: structure.unwrap_or_default(),
+        candidates: Vec::new(),
+        closed_loop: None,
+        next_experiment: None,
         data_health,
         parameters,
         model: refined,
+        explorer,
         document: Default::default(),
-    };
-    let figures = figures(search, &left_before, &left_after);
-    refinement.document = pages::document(&refinement, logs, &figures, WORDS);
-    refinement
+    }
 }
 
-/// What the pictures call the robot's variables.
-const WORDS: pages::Words = pages::Words {
-    effort: "combined force",
-    effort_unit: "N",
-    position: ("motor angle", "rad"),
-    speed: ("motor speed", "rad/s"),
-};
-
-/// c at the held-out rows, as pictures take it.
-fn figures(search: &Search<'_>, before: &Pair, after: &Pair) -> pages::Figures {
+/// c at every row.
+fn explorer(search: &Search<'_>, before: &Pair, after: &Pair) -> Explorer {
     let trace = search.trace;
-    let parts = trace.parts();
-    let held = |column: Vec<f64>| -> Vec<f64> {
-        column.into_iter().zip(&parts).filter(|(_, part)| **part == Part::HeldOut).map(|(v, _)| v).collect()
-    };
-    pages::Figures {
-        time_s: held(trace.variable(|m| m.time_s)),
-        position: held(trace.variable(|m| m.motor_angle_rad.rem_euclid(std::f64::consts::TAU))),
-        speed: held(trace.variable(|m| m.motor_speed_rad_s)),
-        before: held(search.channels.combined(before)),
-        after: held(search.channels.combined(after)),
+    // As what was measured less what the model asks for.
+    let combined = |pair: &Pair| search.channels.combined(pair).iter().map(|c| -c).collect();
+    let torque = trace.torque_nm();
+    let radius = trace.machine.parameters.wheel_radius_m;
+    let measured = [torque.iter().map(|t| -t / radius).collect(), torque.clone()];
+    let variable = |name, unit, of: fn(&Moment) -> f64| Variable::new(name, unit, trace.variable(of));
+    let angle = trace.variable(|m| m.motor_angle_rad);
+    Explorer {
+        channel: "combined",
+        variables: vec![
+            variable("time_s", "s", |m| m.time_s),
+            variable("motor_angle_rad", "rad", |m| m.motor_angle_rad),
+            variable("motor_speed_rad_s", "rad/s", |m| m.motor_speed_rad_s),
+            Variable::new("torque_nm", "N m", torque),
+            variable("x_m", "m", |m| m.x_m),
+            variable("x_dot_m_s", "m/s", |m| m.x_dot_m_s),
+            variable("pitch_rad", "rad", |m| m.pitch_rad),
+            variable("pitch_rate_rad_s", "rad/s", |m| m.pitch_rate_rad_s),
+        ],
+        held_out: trace.parts().iter().map(|part| *part == Part::HeldOut).collect(),
+        measured: combined(&measured),
+        before: combined(before),
+        after: combined(after),
+        unit: "N",
+        noise_floor: search.channels.floors[0],
+        orders: Vec::new(),
     }
+    .finished(Some(&angle))
 }
 
 fn corrections(nuisances: &[Nuisance], fit: &Fit) -> Vec<Corrected> {
@@ -254,7 +267,7 @@ fn errors(trace: &Trace<'_>, channels: &Channels, left: &Pair) -> Errors {
     let scales = [torque / radius, torque / radius, torque];
     let per = |value: &dyn Fn(usize) -> f64, plain: bool| {
         let of = |(i, (name, unit)): (usize, &(&'static str, &'static str))| {
-            (*name, Quantity { value: value(i), unit: if plain { "1" } else { unit } })
+            (*name, Quantity::new(value(i), if plain { "1" } else { unit }))
         };
         PerChannel(names.iter().enumerate().map(of).collect())
     };
