@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 use flqr_core::control::{BalanceController, ControllerKind};
 use flqr_core::friction::{Compensation, Stribeck};
 use flqr_core::lqr::Weights;
-use flqr_core::model_file::{AxisParameters, Model, Rig, RobotModel, presets};
+use flqr_core::model_file::{AxisParameters, Model, Rig, RobotModel, Tolerances, presets};
 use nalgebra::Matrix2x4;
 
 /// Weights and compensation of a robot whose file has none: those of the paper's preset, without the entry
@@ -24,6 +24,8 @@ pub(crate) struct Session {
     pub(crate) name: String,
     /// Robot or axis, as in the file and as edited; what is filled in for use is not here, so it is not saved.
     pub(crate) rig: Rig,
+    /// How well the model's numbers are known.
+    pub(crate) tolerance: Tolerances,
     /// Whether friction is fed forward.
     pub(crate) controller: ControllerKind,
 }
@@ -31,7 +33,7 @@ pub(crate) struct Session {
 impl Session {
     /// Opens a model.
     pub(crate) fn new(model: Model, controller: ControllerKind) -> Self {
-        Self { name: model.name, rig: model.rig, controller }
+        Self { name: model.name, rig: model.rig, tolerance: model.tolerance, controller }
     }
 
     /// What is used although the model has it not, as a sentence.
@@ -50,7 +52,7 @@ impl Session {
 
     /// The model as it would be saved.
     pub(crate) fn model(&self) -> Model {
-        Model { name: self.name.clone(), rig: self.rig.clone() }
+        Model { name: self.name.clone(), rig: self.rig.clone(), tolerance: self.tolerance.clone() }
     }
 
     /// The model as it is used, with what is filled in.

@@ -53,18 +53,18 @@ pub enum Axis {
 }
 
 /// Place of a parameter in [`Axis::keys`].
-mod place {
-    pub(super) const INERTIA: usize = 0;
-    pub(super) const VISCOUS: usize = 1;
-    pub(super) const COULOMB: usize = 2;
-    pub(super) const OFFSET: usize = 3;
-    pub(super) const STATIC: usize = 4;
-    pub(super) const GRAVITY: usize = 5;
-    pub(super) const STRIBECK_SPEED: usize = 6;
-    pub(super) const STRIBECK_EXPONENT: usize = 7;
+pub(crate) mod place {
+    pub(crate) const INERTIA: usize = 0;
+    pub(crate) const VISCOUS: usize = 1;
+    pub(crate) const COULOMB: usize = 2;
+    pub(crate) const OFFSET: usize = 3;
+    pub(crate) const STATIC: usize = 4;
+    pub(crate) const GRAVITY: usize = 5;
+    pub(crate) const STRIBECK_SPEED: usize = 6;
+    pub(crate) const STRIBECK_EXPONENT: usize = 7;
     /// Parameters in which the model is linear; they come first.
-    pub(super) const LINEAR: usize = 6;
-    pub(super) const ALL: usize = 8;
+    pub(crate) const LINEAR: usize = 6;
+    pub(crate) const ALL: usize = 8;
 }
 
 impl Axis {

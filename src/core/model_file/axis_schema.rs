@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::effects_schema::EffectTable;
 use super::refusal::Refusal;
+use super::tolerance::ToleranceTable;
 use super::{AxisModel, AxisParameters, Model, Rig, effects_schema};
 use crate::effects::MachineKind;
 use crate::friction::{Stribeck, StribeckParameters};
@@ -15,6 +16,8 @@ pub(super) struct AxisFile {
     name: String,
     axis: AxisTable,
     friction: Option<AxisFrictionTable>,
+    #[serde(default, skip_serializing_if = "ToleranceTable::is_default")]
+    tolerance: ToleranceTable,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     effects: Vec<EffectTable>,
 }
@@ -120,11 +123,12 @@ impl AxisFile {
         };
         let mut axis = AxisModel::new(parameters);
         effects_schema::read_into_axis(self.effects, machine, &mut axis)?;
-        Ok(Model { name: self.name, rig: Rig::Axis(axis) })
+        let tolerance = self.tolerance.read(machine)?;
+        Ok(Model { name: self.name, rig: Rig::Axis(axis), tolerance })
     }
 
-    pub(super) fn from_model(name: &str, model: &AxisModel) -> Self {
-        let (axis, friction) = match model.parameters {
+    pub(super) fn from_model(model: &Model, own: &AxisModel) -> Self {
+        let (axis, friction) = match own.parameters {
             AxisParameters::Rotary { inertia_kg_m2, gravity_torque_nm, friction } => {
                 let table = friction.map(|curve| {
                     let p = curve.parameters();
@@ -156,6 +160,12 @@ impl AxisFile {
                 (AxisTable::Linear { mass_kg }, table)
             }
         };
-        Self { name: name.to_owned(), axis, friction, effects: effects_schema::written(&model.effects) }
+        Self {
+            name: model.name.clone(),
+            axis,
+            friction,
+            tolerance: ToleranceTable::Written(model.tolerance.clone()),
+            effects: effects_schema::written(&own.effects),
+        }
     }
 }

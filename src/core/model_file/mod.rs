@@ -9,6 +9,7 @@ mod effects_schema;
 pub mod presets;
 mod refusal;
 mod robot_schema;
+mod tolerance;
 
 use std::borrow::Cow;
 
@@ -23,6 +24,7 @@ use crate::robot::{
 use axis_schema::AxisFile;
 use refusal::Refusal;
 use robot_schema::RobotFile;
+pub use tolerance::Tolerances;
 
 /// A loaded model.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,6 +33,8 @@ pub struct Model {
     pub name: String,
     /// What is modelled.
     pub rig: Rig,
+    /// How well its numbers are known.
+    pub tolerance: Tolerances,
 }
 
 /// What a model describes.
@@ -231,8 +235,8 @@ impl Model {
     /// The model as TOML that [`Model::from_toml`] reads back to an equal model.
     pub fn to_toml(&self) -> String {
         let text = match &self.rig {
-            Rig::Robot(robot) => toml::to_string(&RobotFile::from_model(&self.name, robot)),
-            Rig::Axis(axis) => toml::to_string(&AxisFile::from_model(&self.name, axis)),
+            Rig::Robot(robot) => toml::to_string(&RobotFile::from_model(self, robot)),
+            Rig::Axis(axis) => toml::to_string(&AxisFile::from_model(self, axis)),
         };
         text.expect("plain numbers and strings always have a TOML form")
     }

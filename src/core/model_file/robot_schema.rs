@@ -5,7 +5,9 @@ use serde::{Deserialize, Serialize};
 
 use super::effects_schema::EffectTable;
 use super::refusal::Refusal;
+use super::tolerance::ToleranceTable;
 use super::{Model, Rig, RobotModel, effects_schema};
+use crate::effects::MachineKind;
 use crate::friction::{Compensation, Stribeck, StribeckParameters};
 use crate::lqr::Weights;
 use crate::robot::{
@@ -37,6 +39,8 @@ pub(super) struct RobotFile {
     link: LinkSettings,
     #[serde(default, skip_serializing_if = "is_default")]
     safety: SafetyLimits,
+    #[serde(default, skip_serializing_if = "ToleranceTable::is_default")]
+    tolerance: ToleranceTable,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     effects: Vec<EffectTable>,
 }
@@ -245,26 +249,28 @@ impl RobotFile {
             checked.map_err(Refusal::parameter(&[table]))?;
         }
         effects_schema::read_into_robot(self.effects, &mut robot)?;
-        Ok(Model { name: self.name, rig: Rig::Robot(Box::new(robot)) })
+        let tolerance = self.tolerance.read(MachineKind::Robot)?;
+        Ok(Model { name: self.name, rig: Rig::Robot(Box::new(robot)), tolerance })
     }
 
-    pub(super) fn from_model(name: &str, model: &RobotModel) -> Self {
-        let [left, right] = model.friction.map(|curve| curve.map(|curve| *curve.parameters()));
+    pub(super) fn from_model(model: &Model, robot: &RobotModel) -> Self {
+        let [left, right] = robot.friction.map(|curve| curve.map(|curve| *curve.parameters()));
         Self {
-            name: name.to_owned(),
-            robot: RobotTable::from_parameters(&model.parameters, model.legs.as_ref()),
-            chassis: model.chassis,
+            name: model.name.clone(),
+            robot: RobotTable::from_parameters(&robot.parameters, robot.legs.as_ref()),
+            chassis: robot.chassis,
             friction: MotorFrictionTable { left, right },
-            lqr: model.weights.as_ref().map(LqrTable::from_weights),
-            compensation: model.compensation,
-            yaw_hold: model.yaw_hold,
-            limits: model.limits,
-            actuation: model.actuation,
-            sensors: model.sensors,
-            surroundings: model.surroundings.clone(),
-            link: model.link,
-            safety: model.safety,
-            effects: effects_schema::written(&model.effects),
+            lqr: robot.weights.as_ref().map(LqrTable::from_weights),
+            compensation: robot.compensation,
+            yaw_hold: robot.yaw_hold,
+            limits: robot.limits,
+            actuation: robot.actuation,
+            sensors: robot.sensors,
+            surroundings: robot.surroundings.clone(),
+            link: robot.link,
+            safety: robot.safety,
+            tolerance: ToleranceTable::Written(model.tolerance.clone()),
+            effects: effects_schema::written(&robot.effects),
         }
     }
 }

@@ -105,7 +105,11 @@ fn a_shaft_whose_cogging_is_known_turns_more_evenly() {
     };
     let cogging = [("order_1", 7.0), ("cos_1_nm", 0.02), ("sin_1_nm", 0.03)];
     let cogging = Effect::new("cogging", MachineKind::Rotary, None, cogging).unwrap();
-    let model = |effects| Model { name: "shaft".to_owned(), rig: Rig::Axis(axis(effects)) };
+    let model = |effects| Model {
+        name: "shaft".to_owned(),
+        rig: Rig::Axis(axis(effects)),
+        tolerance: Default::default(),
+    };
     let [bare, cogged] = [model(Vec::new()), model(vec![cogging])];
     let spread = |declared: &Model, controller| {
         let experiment = Experiment { seconds: 10.0, ..Experiment::new(Scenario::SpeedTracking, controller) };

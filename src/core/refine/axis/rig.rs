@@ -2,28 +2,14 @@
 
 use crate::effects::{Effect, Machine, MachineKind, Place};
 use crate::friction::{Stribeck, StribeckParameters};
-use crate::model_file::{AxisParameters, Model, Rig};
+use crate::identify::motion::{Axis, place};
+use crate::model_file::{AxisParameters, Model, Rig, Tolerances};
 use crate::refine::Variable;
 use crate::refine::error::RefineError;
 use crate::robot::Motor;
 
 use super::trace::{Names, Rows, Trace};
 use crate::refine::select::Member;
-
-/// Tolerances of declared numbers, as shares.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Tolerances {
-    pub(super) mass: f64,
-    pub(super) length: f64,
-    pub(super) inertia: f64,
-    pub(super) friction: f64,
-}
-
-impl Default for Tolerances {
-    fn default() -> Self {
-        Self { mass: 0.02, length: 0.01, inertia: 0.05, friction: 0.1 }
-    }
-}
 
 /// Share of the Coulomb level that an offset may be off by, beside its own tolerance.
 const OFFSET_OF_COULOMB: f64 = 0.01;
@@ -109,12 +95,16 @@ impl Declared {
             gravity,
             friction: friction.map(|curve| *curve.parameters()),
             effects,
-            tolerances: Tolerances::default(),
+            tolerances: model.tolerance.clone(),
         }
     }
 
     pub(super) fn is_linear(&self) -> bool {
         self.machine.kind == MachineKind::Linear
+    }
+
+    fn axis(&self) -> Axis {
+        if self.is_linear() { Axis::Linear } else { Axis::Rotary }
     }
 
     pub(super) fn names(&self) -> Names {
@@ -197,14 +187,15 @@ impl Declared {
     /// A name in `estimate` that is none.
     pub(super) fn nuisances(&self, rows: &Rows, estimate: &[String]) -> Result<Vec<Nuisance>, RefineError> {
         let curve = self.curve();
-        let keys = if self.is_linear() { LINEAR_KEYS } else { ROTARY_KEYS };
+        let keys = self.axis().keys();
         if let Some(name) = estimate.iter().find(|name| *name != "all" && !keys.contains(&name.as_str())) {
             let allowed = keys.iter().filter(|key| !key.is_empty()).copied().collect::<Vec<_>>().join(", ");
             return Err(RefineError::UnknownParameter { name: name.clone(), allowed });
         }
         let all = estimate.iter().any(|name| name == "all");
-        let free = |index: usize| (all && index <= OFFSET) || estimate.iter().any(|name| name == keys[index]);
-        let t = self.tolerances;
+        let free =
+            |index: usize| (all && index <= place::OFFSET) || estimate.iter().any(|name| name == keys[index]);
+        let share = |index: usize| self.tolerances.share_of(keys[index]);
         let mut found = Vec::new();
         let mut add = |index: usize, declared: f64, tolerance: f64, effect, column: Vec<f64>| {
             if free(index) || tolerance > 0.0 {
@@ -219,16 +210,16 @@ impl Declared {
             }
         };
         add(
-            INERTIA,
+            place::INERTIA,
             self.inertia,
-            self.inertia * if self.is_linear() { t.mass } else { t.inertia },
+            share(place::INERTIA) * self.inertia,
             "inertia_error",
             rows.column(Trace::second_difference),
         );
         add(
-            VISCOUS,
+            place::VISCOUS,
             curve.viscous_nm_s_rad,
-            t.friction * curve.viscous_nm_s_rad,
+            share(place::VISCOUS) * curve.viscous_nm_s_rad,
             "viscous_error",
             rows.column(|trace| trace.speed.clone()),
         );
@@ -242,14 +233,14 @@ impl Declared {
             rows.column(|trace| trace.speed.iter().map(|&speed| direction(speed) * value(speed)).collect())
         };
         add(
-            COULOMB,
+            place::COULOMB,
             curve.coulomb_nm,
-            t.friction * curve.coulomb_nm,
+            share(place::COULOMB) * curve.coulomb_nm,
             "coulomb_error",
             each(&|speed| 1.0 - fade(speed)),
         );
         if stribeck {
-            add(STATIC, curve.static_nm, t.friction * curve.static_nm, "", each(&fade));
+            add(place::STATIC, curve.static_nm, share(place::STATIC) * curve.static_nm, "", each(&fade));
             let drop = curve.static_nm - curve.coulomb_nm;
             const STEP: f64 = 1e-3;
             let slope = |step_scale: f64, step_exponent: f64| {
@@ -261,21 +252,33 @@ impl Declared {
                 let (up, down) = (at(1.0), at(-1.0));
                 each(&|speed| drop * (up(speed) - down(speed)) / (2.0 * STEP))
             };
-            add(STRIBECK_SPEED, curve.stribeck_speed_rad_s, t.friction, "", slope(STEP, 0.0));
-            add(STRIBECK_EXPONENT, curve.stribeck_exponent, t.friction, "", slope(0.0, STEP));
+            add(
+                place::STRIBECK_SPEED,
+                curve.stribeck_speed_rad_s,
+                share(place::STRIBECK_SPEED),
+                "",
+                slope(STEP, 0.0),
+            );
+            add(
+                place::STRIBECK_EXPONENT,
+                curve.stribeck_exponent,
+                share(place::STRIBECK_EXPONENT),
+                "",
+                slope(0.0, STEP),
+            );
         }
-        let offset = t.friction * curve.offset_nm.abs() + OFFSET_OF_COULOMB * curve.coulomb_nm;
+        let offset = share(place::OFFSET) * curve.offset_nm.abs() + OFFSET_OF_COULOMB * curve.coulomb_nm;
         add(
-            OFFSET,
+            place::OFFSET,
             curve.offset_nm,
             offset,
             "friction_asymmetry",
             rows.column(|trace| vec![1.0; trace.position.len()]),
         );
-        let gravity = self.gravity.abs() * (t.mass + t.length);
+        let gravity = share(place::GRAVITY) * self.gravity.abs();
         let sines = |trace: &Trace| trace.position.iter().map(|&angle| libm::sin(angle)).collect();
         if !self.is_linear() {
-            add(GRAVITY, self.gravity, gravity, "", rows.column(sines));
+            add(place::GRAVITY, self.gravity, gravity, "", rows.column(sines));
         }
         found.push(Nuisance {
             key: "",
@@ -298,24 +301,24 @@ impl Declared {
         let value = |key: &str, declared: f64| {
             corrections.iter().find(|(name, _)| *name == key).map_or(declared, |&(_, value)| value)
         };
-        let keys = if self.is_linear() { LINEAR_KEYS } else { ROTARY_KEYS };
+        let keys = self.axis().keys();
         let p = self.curve();
         let curve = Stribeck::new(StribeckParameters {
-            coulomb_nm: value(keys[COULOMB], p.coulomb_nm).max(0.0),
+            coulomb_nm: value(keys[place::COULOMB], p.coulomb_nm).max(0.0),
             static_nm: match p.static_nm == p.coulomb_nm {
-                true => value(keys[COULOMB], p.coulomb_nm).max(0.0),
-                false => value(keys[STATIC], p.static_nm).max(0.0),
+                true => value(keys[place::COULOMB], p.coulomb_nm).max(0.0),
+                false => value(keys[place::STATIC], p.static_nm).max(0.0),
             },
-            viscous_nm_s_rad: value(keys[VISCOUS], p.viscous_nm_s_rad).max(0.0),
-            stribeck_speed_rad_s: value(keys[STRIBECK_SPEED], p.stribeck_speed_rad_s),
-            stribeck_exponent: value(keys[STRIBECK_EXPONENT], p.stribeck_exponent).min(10.0),
-            offset_nm: value(keys[OFFSET], p.offset_nm),
+            viscous_nm_s_rad: value(keys[place::VISCOUS], p.viscous_nm_s_rad).max(0.0),
+            stribeck_speed_rad_s: value(keys[place::STRIBECK_SPEED], p.stribeck_speed_rad_s),
+            stribeck_exponent: value(keys[place::STRIBECK_EXPONENT], p.stribeck_exponent).min(10.0),
+            offset_nm: value(keys[place::OFFSET], p.offset_nm),
         })
         .ok();
         let has_friction = self.friction.is_some()
-            || corrections.iter().any(|(key, _)| keys[VISCOUS..=OFFSET].contains(key));
+            || corrections.iter().any(|(key, _)| keys[place::VISCOUS..=place::OFFSET].contains(key));
         let friction = if has_friction { curve } else { None };
-        let inertia = value(keys[INERTIA], self.inertia);
+        let inertia = value(keys[place::INERTIA], self.inertia);
         let inertia = if inertia > 0.0 { inertia } else { self.inertia };
         let mut model = model.clone();
         match &mut model.rig {
@@ -326,7 +329,7 @@ impl Declared {
             Rig::Axis(axis) => match &mut axis.parameters {
                 AxisParameters::Rotary { inertia_kg_m2, gravity_torque_nm, friction: own } => {
                     (*inertia_kg_m2, *own) = (inertia, friction);
-                    *gravity_torque_nm = value(keys[GRAVITY], self.gravity);
+                    *gravity_torque_nm = value(keys[place::GRAVITY], self.gravity);
                 }
                 AxisParameters::Linear { mass_kg, friction: own } => (*mass_kg, *own) = (inertia, friction),
             },
@@ -334,37 +337,6 @@ impl Declared {
         model
     }
 }
-
-const INERTIA: usize = 0;
-const VISCOUS: usize = 1;
-const COULOMB: usize = 2;
-const OFFSET: usize = 3;
-const STATIC: usize = 4;
-const GRAVITY: usize = 5;
-const STRIBECK_SPEED: usize = 6;
-const STRIBECK_EXPONENT: usize = 7;
-
-/// Keys of the model file in that order.
-const ROTARY_KEYS: [&str; 8] = [
-    "inertia_kg_m2",
-    "viscous_nm_s_rad",
-    "coulomb_nm",
-    "offset_nm",
-    "static_nm",
-    "gravity_torque_nm",
-    "stribeck_speed_rad_s",
-    "stribeck_exponent",
-];
-const LINEAR_KEYS: [&str; 8] = [
-    "mass_kg",
-    "viscous_n_s_m",
-    "coulomb_n",
-    "offset_n",
-    "static_n",
-    "",
-    "stribeck_speed_m_s",
-    "stribeck_exponent",
-];
 
 pub(super) fn direction(speed: f64) -> f64 {
     if speed == 0.0 { 0.0 } else { speed.signum() }

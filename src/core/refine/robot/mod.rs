@@ -106,12 +106,12 @@ pub(super) fn refine(
     if data_health.iter().any(|finding| finding.severity == Severity::Error) {
         return Ok(unfit(model, data_health));
     }
-    check_names(&nuisances(&trace, &[]), &options.estimate)?;
+    check_names(&nuisances(&trace, &model.tolerance, &[]), &options.estimate)?;
     let mut channels = Channels::new(&trace, &trace.residual());
     for pass in 0..2 {
         report(watch, 0.1 + 0.45 * f64::from(pass))?;
         let target = trace.residual();
-        let (mut free, mut tried) = (nuisances(&trace, &options.estimate), library(&trace));
+        let (mut free, mut tried) = (nuisances(&trace, &model.tolerance, &options.estimate), library(&trace));
         whitened(&mut tried, &mut free, &channels);
         let mut search = Search::new(&trace, &channels, &free, &tried, &target);
         search.run(&mut |share| report(watch, 0.1 + 0.45 * f64::from(pass) + 0.4 * share))?;

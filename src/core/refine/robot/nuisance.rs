@@ -1,6 +1,7 @@
 //! Declared numbers, free within their tolerances.
 
 use crate::effects::{Action, KINDS, Moment};
+use crate::model_file::Tolerances;
 use crate::refine::select::Member;
 
 use super::trace::{Form, Pair, Trace};
@@ -30,7 +31,7 @@ const REST_SHARE: f64 = 0.3;
 const REST_SPEED_RAD_S: f64 = 0.1;
 
 /// All declared numbers of a robot; those named in `estimate` (or all of them) without a tolerance.
-pub(super) fn nuisances(trace: &Trace, estimate: &[String]) -> Vec<Nuisance> {
+pub(super) fn nuisances(trace: &Trace, known: &Tolerances, estimate: &[String]) -> Vec<Nuisance> {
     let p = trace.machine.parameters;
     let friction = trace.robot.friction.map(|curve| curve.map(|curve| *curve.parameters()));
     let mut found = Vec::new();
@@ -45,17 +46,32 @@ pub(super) fn nuisances(trace: &Trace, estimate: &[String]) -> Vec<Nuisance> {
         let kind = KINDS.iter().find(|kind| kind.id == id).expect("the library has the parameters' errors");
         trace.columns(kind, Form::Law, &[]).swap_remove(0)
     };
-    add("body_mass_kg", p.body_mass_kg, 0.02 * p.body_mass_kg, of_kind("mass_error"));
-    add("com_height_m", p.com_height_m, 0.01 * p.com_height_m, of_kind("com_height_error"));
+    add(
+        "body_mass_kg",
+        p.body_mass_kg,
+        known.share_of("body_mass_kg") * p.body_mass_kg,
+        of_kind("mass_error"),
+    );
+    add(
+        "com_height_m",
+        p.com_height_m,
+        known.share_of("com_height_m") * p.com_height_m,
+        of_kind("com_height_error"),
+    );
     add(
         "body_inertia_kg_m2",
         p.body_inertia_kg_m2,
-        0.05 * p.body_inertia_kg_m2,
+        known.share_of("body_inertia_kg_m2") * p.body_inertia_kg_m2,
         of_kind("body_inertia_error"),
     );
-    add("wheel_inertia_kg_m2", p.wheel_inertia_kg_m2, 0.05 * p.wheel_inertia_kg_m2, of_kind("inertia_error"));
+    add(
+        "wheel_inertia_kg_m2",
+        p.wheel_inertia_kg_m2,
+        known.share_of("wheel_inertia_kg_m2") * p.wheel_inertia_kg_m2,
+        of_kind("inertia_error"),
+    );
     let wheels = trace.pair(|| |m: &Moment| Action::force(-2.0 * m.x_accel_m_s2, 0.0, 0.0));
-    add("wheel_mass_kg", p.wheel_mass_kg, 0.02 * p.wheel_mass_kg, wheels);
+    add("wheel_mass_kg", p.wheel_mass_kg, known.share_of("wheel_mass_kg") * p.wheel_mass_kg, wheels);
     let both = |of: fn(&crate::friction::StribeckParameters) -> f64| {
         friction.iter().flatten().map(|f| of(f) * of(f)).sum::<f64>().sqrt()
     };
@@ -67,29 +83,30 @@ pub(super) fn nuisances(trace: &Trace, estimate: &[String]) -> Vec<Nuisance> {
     };
     // Of both motors together, which turn alike: the left one's key stands for both.
     let declared = |of: fn(&crate::friction::StribeckParameters) -> f64| curve.map_or(0.0, |f| of(&f));
-    let share = |of: fn(&crate::friction::StribeckParameters) -> f64| 0.1 * both(of);
+    let share =
+        |key: &str, of: fn(&crate::friction::StribeckParameters) -> f64| known.share_of(key) * both(of);
     add(
         "coulomb_nm",
         declared(|f| f.coulomb_nm),
-        share(|f| f.coulomb_nm),
+        share("coulomb_nm", |f| f.coulomb_nm),
         trace.pair(|| move |m: &Moment| Action::friction(1.0 - fading(m))),
     );
     add(
         "static_nm",
         declared(|f| f.static_nm),
-        share(|f| f.static_nm),
+        share("static_nm", |f| f.static_nm),
         trace.pair(|| move |m: &Moment| Action::friction(fading(m))),
     );
     add(
         "viscous_nm_s_rad",
         declared(|f| f.viscous_nm_s_rad),
-        share(|f| f.viscous_nm_s_rad),
+        share("viscous_nm_s_rad", |f| f.viscous_nm_s_rad),
         trace.pair(|| |m: &Moment| Action::motor(-m.motor_speed_rad_s)),
     );
     add(
         "offset_nm",
         declared(|f| f.offset_nm),
-        share(|f| f.offset_nm),
+        share("offset_nm", |f| f.offset_nm),
         trace.pair(|| |_: &Moment| Action::motor(-1.0)),
     );
     let rest = REST_SHARE * both(|f| f.static_nm);

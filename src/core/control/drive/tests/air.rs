@@ -56,8 +56,11 @@ fn a_multisine_records_bench_logs_from_which_the_inertia_is_fitted() {
     let (rig, stop) = in_air(Excitation::Multisine { seconds: 20.0 }, 1.0, 30.0);
     assert_eq!(stop, Some(StopReason::Done));
     let robot = paper();
-    let model =
-        Model { name: "robot".to_owned(), rig: crate::model_file::Rig::Robot(Box::new(robot.clone())) };
+    let model = Model {
+        name: "robot".to_owned(),
+        rig: crate::model_file::Rig::Robot(Box::new(robot.clone())),
+        tolerance: Default::default(),
+    };
     for motor in Motor::BOTH {
         let options = FitOptions { estimate: vec!["inertia_kg_m2".to_owned()], ..FitOptions::default() };
         let watch = &mut |_: &_| ControlFlow::Continue(());
