@@ -122,7 +122,7 @@ differ weight log
 differ log fit
 
 echo "running LQR and FLQR"
-xdotool key ctrl+3
+xdotool key ctrl+4
 until_state 10 "the experiments page is there" '.tab == "experiments"'
 picture no-run
 xdotool key ctrl+Return

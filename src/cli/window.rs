@@ -43,6 +43,7 @@ pub(crate) struct Arguments {
 enum TabName {
     Tune,
     Friction,
+    Refine,
     Experiments,
     Robot,
 }
@@ -54,6 +55,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
     };
     let tab = match (arguments.tab, &arguments.log) {
         (Some(TabName::Friction), _) | (None, Some(_)) => Tab::Friction,
+        (Some(TabName::Refine), _) => Tab::Refine,
         (Some(TabName::Experiments), _) => Tab::Experiments,
         (Some(TabName::Robot), _) => Tab::Robot,
         (Some(TabName::Tune), _) | (None, None) => Tab::Tune,

@@ -3,7 +3,7 @@
 mod apply;
 mod shell;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -13,7 +13,8 @@ use flqr_core::control::drive::Stage;
 use flqr_core::device::{Event, EventKind};
 use flqr_core::model_file::Model;
 
-use crate::command::{Command, Commands, Source};
+use crate::column_map::ColumnMapForm;
+use crate::command::{Command, Commands, FilePurpose, Source};
 use crate::context::ViewContext;
 use crate::design::Designer;
 use crate::dialog::{Answer, Dialog};
@@ -23,6 +24,7 @@ use crate::history::{Channel, History};
 use crate::job::{Job, Outcome, Waker};
 use crate::live::{Live, LiveCommand};
 use crate::recent::{Recent, RecentFile};
+use crate::refine::{RefineCommand, RefineTab};
 use crate::robot::{Link, RobotTab, sentence};
 use crate::session::Session;
 use crate::state_out::StateOut;
@@ -37,6 +39,8 @@ pub enum Tab {
     Tune,
     /// Friction from a measured log.
     Friction,
+    /// What the model lacks, from measured logs.
+    Refine,
     /// The paper's experiments on the simulated robot.
     Experiments,
     /// A real robot: connection, health, arming, recording.
@@ -78,6 +82,7 @@ pub struct App {
     history: History,
     tune: TuneTab,
     friction: FrictionTab,
+    refine: RefineTab,
     experiments: ExperimentsTab,
     link: Link,
     robot: RobotTab,
@@ -106,6 +111,7 @@ impl App {
             Arc::new(move || ctx.request_repaint())
         };
         let session = Session::new(options.model, ControllerKind::Flqr);
+        let column_map = ColumnMapForm::new(&options.column_map);
         let state_out = options.state_out.map(StateOut::start).transpose()?;
         let mut app = Self {
             saved: session.clone(),
@@ -118,7 +124,8 @@ impl App {
             designer: Designer::default(),
             live: Live::start(&waker, options.paused)?,
             history: History::default(),
-            friction: FrictionTab::new(&options.column_map),
+            friction: FrictionTab::new(column_map.clone()),
+            refine: RefineTab::new(column_map),
             experiments: ExperimentsTab::default(),
             link: Link::new(options.devices),
             robot: RobotTab::default(),
@@ -139,7 +146,10 @@ impl App {
         app.reset_live();
         app.say_loaded();
         if let Some(log) = options.log {
-            app.commands.send(Command::LoadLog(log));
+            app.commands.send(match options.tab {
+                Tab::Refine => Command::Refine(RefineCommand::Load { path: log, held_out: false }),
+                _ => Command::LoadLog(log),
+            });
         }
         if let Some(imu) = &options.imu {
             app.robot.form.fill_imu(imu);
@@ -183,6 +193,7 @@ impl App {
     fn page_ui(&mut self, ui: &mut Ui) {
         let context = ViewContext {
             session: &self.session,
+            model_path: self.model_path.as_deref().filter(|_| self.session == self.saved),
             designer: &self.designer,
             history: if self.source == Source::Simulated { &self.history } else { &self.link.history },
             live: &self.live.status,
@@ -201,6 +212,10 @@ impl App {
                 self.friction.ui(&context, ui);
                 false
             }
+            Tab::Refine => {
+                self.refine.ui(&context, ui);
+                false
+            }
             Tab::Experiments => {
                 self.experiments.ui(&context, ui);
                 false
@@ -209,6 +224,11 @@ impl App {
         if stop {
             self.link.stop();
         }
+    }
+
+    /// The file that holds the very model of the session, if there is one.
+    fn model_path_of_session(&self) -> Option<&Path> {
+        self.model_path.as_deref().filter(|_| self.session == self.saved)
     }
 
     fn drain_live(&mut self) {
@@ -259,19 +279,26 @@ impl App {
     }
 
     fn drain_jobs(&mut self) {
-        for message in [self.friction.drain(), self.experiments.drain()].into_iter().flatten() {
+        for message in
+            [self.friction.drain(), self.refine.drain(), self.experiments.drain()].into_iter().flatten()
+        {
             self.say(message);
         }
-        match self.experiments.drain_saver(&self.waker) {
-            None => {}
-            Some(Ok(message)) => self.say(message),
-            Some(Err(problem)) => self.fail(problem),
+        for result in
+            [self.experiments.drain_saver(&self.waker), self.refine.drain_saver()].into_iter().flatten()
+        {
+            match result {
+                Ok(message) => self.say(message),
+                Err(problem) => self.fail(problem),
+            }
         }
         if let Some(job) = &mut self.recent_job {
             match job.poll().1 {
                 Outcome::Running => {}
                 Outcome::Done(read) => {
-                    self.friction.suggest_column_map(&read.column_map);
+                    if !self.refine.has_logs() {
+                        self.friction.suggest_column_map(&read.column_map);
+                    }
                     self.robot.suggest(&read);
                     self.recent = read;
                     self.recent_job = None;
@@ -306,12 +333,15 @@ impl App {
                 self.friction.note_dialog_problem(purpose, &problem);
                 self.experiments.note_dialog_problem(purpose, &problem);
                 self.robot.note_dialog_problem(purpose, &problem);
+                if let FilePurpose::Refine(purpose) = purpose {
+                    self.refine.note_dialog_problem(purpose, &problem);
+                }
             }
         }
     }
 
     fn save_recent(&mut self) {
-        self.recent.column_map = self.friction.column_map().to_owned();
+        self.recent.column_map = self.friction.column_map();
         if let Some(file) = &mut self.recent_file {
             file.save(&self.recent, &self.waker);
         }
@@ -387,6 +417,7 @@ impl App {
         let tab = match self.tab {
             Tab::Tune => "tune",
             Tab::Friction => "friction",
+            Tab::Refine => "refine",
             Tab::Experiments => "experiments",
             Tab::Robot => "robot",
         };
@@ -417,6 +448,7 @@ impl App {
                 "displacement_mm": self.history.last(Channel::Displacement).map(|x_m| (1e3 * x_m).round()),
             },
             "friction_tab": self.friction.snapshot(),
+            "refine_tab": self.refine.snapshot(&self.session),
             "experiments_tab": self.experiments.snapshot(),
             "robot_tab": self.robot.snapshot(&self.link),
             "message": self.status.text,

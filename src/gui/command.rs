@@ -11,6 +11,7 @@ use flqr_core::robot::RobotParameters;
 
 use crate::app::Tab;
 use crate::experiments::SavedAs;
+use crate::refine::{RefineCommand, RefineFile};
 
 /// Where measured values come from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -81,6 +82,7 @@ pub(crate) enum FilePurpose {
     SaveExperiment(SavedAs),
     OpenReplay,
     SaveRecording,
+    Refine(RefineFile),
 }
 
 /// One wish of a view.
@@ -131,6 +133,8 @@ pub(crate) enum Command {
         path: PathBuf,
         replace: bool,
     },
+    /// Of the page that finds what the model lacks.
+    Refine(RefineCommand),
     /// Looks for CAN interfaces and serial ports.
     RefreshInterfaces,
     /// Opens the session that the form of the robot page describes.

@@ -1,5 +1,7 @@
 //! What a view may read during one frame.
 
+use std::path::Path;
+
 use crate::command::{Commands, Source};
 use crate::design::Designer;
 use crate::history::History;
@@ -11,6 +13,8 @@ use crate::session::Session;
 /// Read access for views, and the way to ask for changes.
 pub(crate) struct ViewContext<'a> {
     pub(crate) session: &'a Session,
+    /// The file that holds the very model of the session.
+    pub(crate) model_path: Option<&'a Path>,
     pub(crate) designer: &'a Designer,
     /// Of the chosen source.
     pub(crate) history: &'a History,

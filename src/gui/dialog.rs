@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 
 use crate::command::FilePurpose;
 use crate::job::{Job, Waker};
+use crate::refine::RefineFile;
 
 /// Nobody sees and cancels a dialog faster than this.
 const FASTEST_PERSON: Duration = Duration::from_millis(150);
@@ -15,10 +16,12 @@ const FASTEST_PERSON: Duration = Duration::from_millis(150);
 /// What to do where no dialog opens.
 fn instead(purpose: FilePurpose) -> &'static str {
     match purpose {
-        FilePurpose::SaveModel | FilePurpose::SaveExperiment(_) => "type a path above and press Save",
+        FilePurpose::SaveModel
+        | FilePurpose::SaveExperiment(_)
+        | FilePurpose::Refine(RefineFile::Save(_)) => "type a path above and press Save",
         FilePurpose::SaveRecording => "type a path above and press Record",
         FilePurpose::OpenReplay => "type the path above",
-        FilePurpose::OpenModel | FilePurpose::OpenLog => {
+        FilePurpose::OpenModel | FilePurpose::OpenLog | FilePurpose::Refine(RefineFile::Log) => {
             "type the path instead, or drop the file onto the window"
         }
     }
@@ -65,7 +68,12 @@ fn ask(purpose: FilePurpose, suggestion: &str) -> Answer {
         FilePurpose::OpenReplay => {
             dialog.set_title("Replay a recording").add_filter("Recording", &["csv", "log"]).pick_file()
         }
-        FilePurpose::OpenLog => dialog.set_title("Open a log").add_filter("Log", &["csv", "txt"]).pick_file(),
+        FilePurpose::Refine(RefineFile::Save(saved_as)) => {
+            dialog.set_title(saved_as.title()).set_file_name(suggestion).save_file()
+        }
+        FilePurpose::OpenLog | FilePurpose::Refine(RefineFile::Log) => {
+            dialog.set_title("Open a log").add_filter("Log", &["csv", "txt"]).pick_file()
+        }
     };
     match chosen {
         Some(path) => Answer::Chosen(path),

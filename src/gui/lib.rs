@@ -1,5 +1,5 @@
-//! The window of flqr: tune the balance controller of a simulated robot, fit friction from a measured log, compare
-//! LQR and FLQR in the paper's experiments, watch and drive a real robot.
+//! The window of flqr: tune the balance controller of a simulated robot, fit friction from a measured log, find what the
+//! model lacks, compare LQR and FLQR in the paper's experiments, watch and drive a real robot.
 //!
 //! # Architecture
 //! - One owner: [`App`] holds the session document, the design, the histories and the jobs.
@@ -10,20 +10,25 @@
 //! - The window holds no number that the core could not recompute.
 
 mod app;
+mod column_map;
 mod command;
 mod context;
 mod design;
 mod dialog;
 mod experiments;
 mod friction;
+mod health_card;
 mod history;
 mod job;
 mod live;
+mod load;
 pub mod plot;
 mod quantity;
 mod recent;
+mod refine;
 pub mod robot;
 mod session;
+mod shell_word;
 mod state_out;
 mod theme;
 mod tune;

@@ -12,6 +12,7 @@ use crate::dialog::Dialog;
 use crate::friction::Fitted;
 use crate::job::{Job, Outcome};
 use crate::live::LiveCommand;
+use crate::refine::{RefineCommand, RefineFile, Surroundings};
 use crate::session::Session;
 
 /// A model file larger than this is none.
@@ -30,6 +31,12 @@ pub(super) fn chosen(purpose: FilePurpose, path: PathBuf) -> Command {
         FilePurpose::OpenReplay => Command::ChooseReplay(path),
         FilePurpose::SaveRecording => Command::ChooseRecording(path),
         // The dialog knows one name as it was typed; what is written may have another or several.
+        FilePurpose::Refine(RefineFile::Log) => {
+            Command::Refine(RefineCommand::Load { path, held_out: false })
+        }
+        FilePurpose::Refine(RefineFile::Save(saved_as)) => {
+            Command::Refine(RefineCommand::Save { saved_as, path, replace: false })
+        }
         FilePurpose::SaveExperiment(saved_as) => Command::SaveExperiment { saved_as, path, replace: false },
     }
 }
@@ -111,6 +118,7 @@ impl App {
                     self.fail(problem);
                 }
             }
+            Command::Refine(command) => self.apply_refine(command),
             Command::RefreshInterfaces => self.robot.look(&self.link, &self.waker),
             Command::Connect => self.connect(),
             Command::Disconnect => self.disconnect(),
@@ -228,6 +236,7 @@ impl App {
         let name = self.model_path.as_deref().and_then(Path::file_name);
         let suggestion = match purpose {
             FilePurpose::SaveExperiment(saved_as) => self.experiments.suggested_name(saved_as),
+            FilePurpose::Refine(RefineFile::Save(saved_as)) => self.refine.suggested_name(saved_as),
             FilePurpose::SaveRecording => self.robot.suggested_name(),
             _ => name.map_or_else(|| "model.toml".to_owned(), |name| name.to_string_lossy().into_owned()),
         };
@@ -379,6 +388,28 @@ impl App {
         self.send_robot();
     }
 
+    fn apply_refine(&mut self, command: RefineCommand) {
+        let model_path = self.model_path_of_session().map(Path::to_owned);
+        let before = self.session.clone();
+        let around = Surroundings { session: &mut self.session, model_path, waker: &self.waker };
+        let done = match self.refine.apply(command, around) {
+            Ok(done) => done,
+            Err(problem) => return self.fail(problem),
+        };
+        if let Some(said) = done.said {
+            self.say(said);
+        }
+        if let Some(log) = done.log {
+            self.recent.note_log(&log);
+            self.save_recent();
+        }
+        if self.session != before {
+            self.tune.refresh(&self.session);
+            self.designer.update(&self.session);
+            self.send_robot();
+        }
+    }
+
     fn start_experiment(&mut self) {
         // The command line of a result names a file that holds the very same model.
         let path = self
@@ -394,6 +425,13 @@ impl App {
         let files = ctx.input(|input| {
             input.raw.dropped_files.iter().map(|file| file.path().to_owned()).collect::<Vec<_>>()
         });
+        let held_out = false;
+        if self.tab == Tab::Refine && files.iter().all(|path| path.extension().is_none_or(|e| e != "toml")) {
+            for path in files {
+                self.commands.send(Command::Refine(RefineCommand::Load { path, held_out }));
+            }
+            return;
+        }
         let Some(path) = files.into_iter().next() else { return };
         if path.extension().is_some_and(|extension| extension == "toml") {
             self.commands.send(Command::LoadModel(path));

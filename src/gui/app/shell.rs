@@ -6,6 +6,7 @@ use flqr_core::device::{Connection, SessionOrder};
 
 use super::{App, Tab};
 use crate::command::{Command, FilePurpose, Source};
+use crate::refine::{Question, RefineCommand, RefineFile};
 use crate::robot::bar_ui;
 use crate::theme::palette;
 use crate::widgets::choice_ui;
@@ -17,12 +18,12 @@ const fn ctrl(key: Key) -> KeyboardShortcut {
 /// Keys and what they do; shown in the help menu.
 const HELP: &[(&str, &str)] = &[
     ("Esc, Space", "STOP a robot that is checked or driven: no torque, motors off"),
-    ("Ctrl+1 … Ctrl+4", "tune, friction, experiments, robot"),
+    ("Ctrl+1 … Ctrl+5", "tune, friction, refine, experiments, robot"),
     ("Ctrl+O", "open a model or a log"),
     ("Ctrl+S", "save the model"),
     ("Ctrl+E", "go to the first weight"),
     ("Ctrl+L", "go to the path of the log, or of what an experiment is saved to"),
-    ("Ctrl+Enter", "start or cancel the fit or the experiment; connect or disconnect the robot"),
+    ("Ctrl+Enter", "start or cancel the fit, the search or the experiment; connect or disconnect the robot"),
     ("Space, ←, →", "play, step (with Shift or Alt: longer, shorter) an experiment"),
     ("Ctrl+P", "pause or run the simulated robot or the replay"),
     ("Ctrl+D", "light or dark"),
@@ -59,9 +60,12 @@ impl App {
             send(Command::SelectTab(Tab::Friction));
         }
         if pressed(Key::Num3) {
-            send(Command::SelectTab(Tab::Experiments));
+            send(Command::SelectTab(Tab::Refine));
         }
         if pressed(Key::Num4) {
+            send(Command::SelectTab(Tab::Experiments));
+        }
+        if pressed(Key::Num5) {
             send(Command::SelectTab(Tab::Robot));
         }
         if pressed(Key::O) {
@@ -70,6 +74,7 @@ impl App {
                 Tab::Robot => FilePurpose::OpenModel,
                 Tab::Tune | Tab::Experiments => FilePurpose::OpenModel,
                 Tab::Friction => FilePurpose::OpenLog,
+                Tab::Refine => FilePurpose::Refine(RefineFile::Log),
             }));
         }
         if pressed(Key::S) {
@@ -90,6 +95,8 @@ impl App {
                 Tab::Tune => {}
                 Tab::Friction if self.friction.fit_is_running() => send(Command::CancelFit),
                 Tab::Friction => send(Command::StartFit),
+                Tab::Refine if self.refine.is_running() => send(Command::Refine(RefineCommand::Cancel)),
+                Tab::Refine => send(Command::Refine(RefineCommand::Start(Question::Refine))),
                 Tab::Experiments if self.experiments.is_running() => send(Command::CancelExperiment),
                 Tab::Experiments => send(Command::StartExperiment),
                 Tab::Robot if self.link.options().is_some() => send(Command::Disconnect),
@@ -104,11 +111,13 @@ impl App {
             self.tune.focus_weights();
         }
         if pressed(Key::L) {
-            if self.tab == Tab::Experiments {
-                self.experiments.focus_path();
-            } else {
-                send(Command::SelectTab(Tab::Friction));
-                self.friction.focus_path();
+            match self.tab {
+                Tab::Experiments => self.experiments.focus_path(),
+                Tab::Refine => self.refine.focus_path(),
+                _ => {
+                    send(Command::SelectTab(Tab::Friction));
+                    self.friction.focus_path();
+                }
             }
         }
     }
@@ -119,12 +128,13 @@ impl App {
             let tabs = [
                 (Tab::Tune, "Tune", "Weights, gains and the live robot (Ctrl+1)"),
                 (Tab::Friction, "Friction", "Friction from a measured log (Ctrl+2)"),
+                (Tab::Refine, "Refine", "What the model lacks, from measured logs (Ctrl+3)"),
                 (
                     Tab::Experiments,
                     "Experiments",
-                    "LQR and FLQR side by side on the simulated robot (Ctrl+3)",
+                    "LQR and FLQR side by side on the simulated robot (Ctrl+4)",
                 ),
-                (Tab::Robot, "Robot", "Connection, health, arming and recording of a robot (Ctrl+4)"),
+                (Tab::Robot, "Robot", "Connection, health, arming and recording of a robot (Ctrl+5)"),
             ];
             ui.scope(|ui| {
                 ui.spacing_mut().button_padding.x = 12.0;

@@ -11,6 +11,8 @@ use flqr_core::simulate::{
     Statistics, StepResponse, Summary, TimedPose,
 };
 
+use crate::shell_word::quoted;
+
 /// What both runs are made with; plain data, apart from their results.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Settings {
@@ -289,16 +291,6 @@ pub(super) fn command_line(settings: &Settings, variant: Variant, model: Option<
         "flqr simulate {model} --scenario {scenario} --controller {} --seconds {seconds} --seed {seed}{gains}",
         variant.name(*scenario)
     )
-}
-
-/// A word of a shell's command.
-fn quoted(text: &str) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "/._-+:@%,=".contains(c);
-    if !text.is_empty() && text.chars().all(plain) {
-        text.to_owned()
-    } else {
-        format!("'{}'", text.replace('\'', "'\\''"))
-    }
 }
 
 #[cfg(test)]

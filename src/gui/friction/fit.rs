@@ -9,10 +9,10 @@ use flqr_core::model_file::{AxisParameters, Model, Rig};
 use flqr_core::record::LogKind;
 
 use super::fitted::Fitted;
-use super::load::LoadedLog;
 use crate::command::Command;
 use crate::context::ViewContext;
 use crate::job::{Job, Outcome, Waker};
+use crate::load::LoadedLog;
 use crate::widgets::{choice_ui, error_ui, hint_ui, section_ui};
 
 /// One report of the optimiser.

@@ -3,7 +3,6 @@
 mod charts;
 mod fit;
 mod fitted;
-mod load;
 mod preview;
 mod result;
 mod source;
@@ -12,14 +11,14 @@ use std::path::Path;
 
 use egui::{CentralPanel, Frame, Margin, Panel, ScrollArea, Ui};
 use flqr_core::model_file::Model;
-use flqr_core::record::Mapping;
 
+use crate::column_map::ColumnMapForm;
 use crate::command::FilePurpose;
 use crate::context::ViewContext;
 use crate::job::Waker;
+use crate::load::Loader;
 use fit::FitRun;
 pub(crate) use fitted::Fitted;
-use load::Loader;
 use preview::Preview;
 use source::SourceForm;
 
@@ -32,7 +31,7 @@ pub(crate) struct FrictionTab {
 }
 
 impl FrictionTab {
-    pub(crate) fn new(column_map: &[Mapping]) -> Self {
+    pub(crate) fn new(column_map: ColumnMapForm) -> Self {
         Self {
             source: SourceForm::new(column_map),
             loader: Loader::default(),
@@ -41,14 +40,14 @@ impl FrictionTab {
         }
     }
 
-    pub(crate) fn column_map(&self) -> &str {
-        &self.source.column_map
+    pub(crate) fn column_map(&self) -> String {
+        self.source.column_map.text()
     }
 
     /// Fills the column map in, unless the user has typed one.
     pub(crate) fn suggest_column_map(&mut self, map: &str) {
-        if self.source.column_map.is_empty() && self.loader.log().is_none() && !self.loader.is_running() {
-            map.clone_into(&mut self.source.column_map);
+        if self.loader.log().is_none() && !self.loader.is_running() {
+            self.source.column_map.suggest(map);
         }
     }
 
@@ -66,7 +65,7 @@ impl FrictionTab {
     pub(crate) fn load(&mut self, path: &Path, waker: &Waker) -> Result<(), String> {
         self.source.path = path.display().to_string();
         self.source.dialog_problem = None;
-        let map = self.source.parse_column_map()?;
+        let map = self.source.column_map.parse()?;
         self.loader.start(path, map, waker)
     }
 

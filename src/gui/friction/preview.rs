@@ -3,7 +3,7 @@
 use egui::{ComboBox, RichText, ScrollArea, Ui};
 use flqr_core::record::LogKind;
 
-use super::load::{LoadedLog, Loader};
+use crate::load::{LoadedLog, Loader};
 use crate::plot::{Curve, DecimationCache, TimeCurve, TimePlot, TimeView};
 use crate::theme::palette;
 use crate::widgets::{choice_ui, hint_ui, mono, section_ui, shown};

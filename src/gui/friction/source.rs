@@ -2,37 +2,28 @@
 
 use std::path::PathBuf;
 
-use egui::{ProgressBar, RichText, TextEdit, Ui};
-use flqr_core::record::{ColumnMap, Mapping, Severity};
+use egui::{RichText, TextEdit, Ui};
+use flqr_core::record::Severity;
 
-use super::load::{LoadedLog, Loader};
+use crate::column_map::ColumnMapForm;
 use crate::command::{Command, FilePurpose};
 use crate::context::ViewContext;
+use crate::health_card::{findings_ui, line_problems_ui, progress_ui};
+use crate::load::Loader;
 use crate::theme::palette;
 use crate::widgets::{error_ui, hint_ui, section_ui, warning_ui};
-
-/// Line problems that are shown one by one.
-const SHOWN_PROBLEMS: usize = 3;
 
 /// What has been typed.
 pub(super) struct SourceForm {
     pub(super) path: String,
-    pub(super) column_map: String,
+    pub(super) column_map: ColumnMapForm,
     pub(super) focus_path: bool,
     pub(super) dialog_problem: Option<String>,
 }
 
 impl SourceForm {
-    pub(super) fn new(column_map: &[Mapping]) -> Self {
-        let column_map = column_map.iter().map(Mapping::to_string).collect::<Vec<_>>().join("; ");
+    pub(super) fn new(column_map: ColumnMapForm) -> Self {
         Self { path: String::new(), column_map, focus_path: false, dialog_problem: None }
-    }
-
-    /// The column map as typed: entries `ours=theirs*factor`, separated by `;` because names may have spaces.
-    pub(super) fn parse_column_map(&self) -> Result<ColumnMap, String> {
-        let entries = self.column_map.split(';').map(str::trim).filter(|entry| !entry.is_empty());
-        let entries: Result<Vec<Mapping>, _> = entries.map(str::parse).collect();
-        entries.and_then(ColumnMap::new).map_err(|error| format!("column map: {error}"))
     }
 
     pub(super) fn ui(&mut self, context: &ViewContext<'_>, loader: &Loader, ui: &mut Ui) {
@@ -40,7 +31,7 @@ impl SourceForm {
             ui.menu_button("Recent", |ui| self.recent_ui(context, ui));
         });
         let entered = self.path_ui(ui);
-        self.map_ui(ui);
+        self.column_map.ui(ui);
         ui.horizontal(|ui| self.buttons_ui(context, loader, ui, entered));
         if let Some(problem) = &self.dialog_problem {
             warning_ui(ui, problem);
@@ -65,18 +56,6 @@ impl SourceForm {
         let entered = field.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
         field.on_hover_text("Type a path and press Enter to load it (Ctrl+L comes here)");
         entered
-    }
-
-    fn map_ui(&mut self, ui: &mut Ui) {
-        let field = TextEdit::singleline(&mut self.column_map)
-            .hint_text("column map: ours=theirs*factor; …")
-            .desired_width(f32::INFINITY);
-        ui.add(field).accessible_name("column map").on_hover_text(
-            "For files with other column names or units: ours=theirs*factor, several separated by “;”.\nExample: torque_nm=current_a*0.32; motor_angle_rad=Angle (rad)",
-        );
-        if let Err(problem) = self.parse_column_map() {
-            error_ui(ui, problem);
-        }
     }
 
     fn buttons_ui(&mut self, context: &ViewContext<'_>, loader: &Loader, ui: &mut Ui, entered: bool) {
@@ -107,18 +86,6 @@ impl SourceForm {
     }
 }
 
-fn progress_ui(loader: &Loader, ui: &mut Ui) {
-    if !loader.is_running() {
-        return;
-    }
-    let text = loader.progress.map_or_else(
-        || "opening".to_owned(),
-        |p| format!("{} rows, {:.1} of {:.1} MB", p.rows, p.bytes as f64 / 1e6, p.total_bytes as f64 / 1e6),
-    );
-    let share = loader.progress.map_or(0.0, |p| p.bytes as f32 / p.total_bytes.max(1) as f32);
-    ui.add(ProgressBar::new(share).text(RichText::new(text).small()));
-}
-
 /// What is wrong with the log, and the mend.
 pub(super) fn health_ui(loader: &Loader, ui: &mut Ui) {
     let Some(loaded) = loader.log() else { return };
@@ -132,62 +99,5 @@ pub(super) fn health_ui(loader: &Loader, ui: &mut Ui) {
         ui.label(RichText::new("nothing wrong was found").small().color(colors.good));
     }
     line_problems_ui(loaded, ui);
-    for finding in &loaded.health {
-        let (mark, color) = match finding.severity {
-            Severity::Info => ("note", colors.measured),
-            Severity::Warning => ("warning", colors.warning),
-            Severity::Error => ("error", colors.error),
-        };
-        ui.horizontal_wrapped(|ui| {
-            ui.spacing_mut().item_spacing.x = 4.0;
-            ui.label(RichText::new(mark).small().strong().color(color));
-            if !finding.column.is_empty() {
-                ui.label(RichText::new(&finding.column).small().monospace());
-            }
-            ui.label(RichText::new(&finding.problem).small());
-            if !finding.mend.is_empty() {
-                ui.label(RichText::new(format!("→ {}", finding.mend)).small().weak());
-            }
-        });
-    }
-}
-
-/// The first rows and cells that could not be used, where they are in the file.
-fn line_problems_ui(loaded: &LoadedLog, ui: &mut Ui) {
-    let log = &loaded.log;
-    if log.problem_count == 0 {
-        return;
-    }
-    let count = format!("{} rows left out, {} problems in lines", log.dropped_rows, log.problem_count);
-    warning_ui(ui, count);
-    for problem in log.problems.iter().take(SHOWN_PROBLEMS) {
-        ui.label(RichText::new(problem.to_string()).small().weak());
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_map_handed_over_is_read_back_also_with_spaces_in_names() {
-        let map: Vec<Mapping> = ["motor_angle_rad=Angle (rad)", "torque_nm=Motor current*0.32"]
-            .map(|entry| entry.parse().unwrap())
-            .to_vec();
-        let form = SourceForm::new(&map);
-        assert_eq!(form.column_map, "motor_angle_rad=Angle (rad); torque_nm=Motor current*0.32");
-        assert_eq!(form.parse_column_map().unwrap().entries(), map);
-    }
-
-    #[test]
-    fn empty_entries_are_none() {
-        for text in ["", "  ", ";", " ; torque_nm=a ;"] {
-            let form = SourceForm { column_map: text.to_owned(), ..SourceForm::new(&[]) };
-            assert_eq!(
-                form.parse_column_map().unwrap().entries().len(),
-                usize::from(text.contains('=')),
-                "{text:?}"
-            );
-        }
-    }
+    findings_ui(&loaded.health, ui);
 }

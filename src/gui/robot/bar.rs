@@ -72,7 +72,7 @@ fn text_ui(link: &Link, (source, tab): (Source, Tab), commands: &Commands, ui: &
     let colors = palette(ui.visuals());
     let Some(options) = link.options() else {
         let away = tab != Tab::Robot;
-        if away && ui.button("Go to connection").on_hover_text("The Robot tab (Ctrl+4)").clicked() {
+        if away && ui.button("Go to connection").on_hover_text("The Robot tab (Ctrl+5)").clicked() {
             commands.send(Command::SelectTab(Tab::Robot));
         }
         ui.weak(format!("{}: nothing is connected", source.name()));

@@ -363,7 +363,7 @@ fn the_command_names_the_file_only_while_it_holds_the_model() {
     assert_eq!(command(&shown), expected);
     click(&mut window, "Tune");
     enter(&mut window, "pitch weight", "3");
-    window.key_press_modifiers(Modifiers::COMMAND, Key::Num3);
+    window.key_press_modifiers(Modifiers::COMMAND, Key::Num4);
     window.run_steps(2);
     assert_eq!(state(&window)["tab"], "experiments");
     window.get_by_label_contains("The model was changed after these runs");

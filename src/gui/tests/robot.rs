@@ -851,7 +851,7 @@ fn keys_choose_the_tab_and_the_strip_leads_to_it() {
     let window_options = WindowOptions { devices: Arc::new(script), ..options(Tab::Tune) };
     let mut window = open(window_options, SIZE);
     let tab = |window: &Window| -> Value { state(window)["tab"].clone() };
-    window.key_press_modifiers(Modifiers::COMMAND, Key::Num4);
+    window.key_press_modifiers(Modifiers::COMMAND, Key::Num5);
     window.run_steps(3);
     assert_eq!(tab(&window), "robot");
     window.get_by_label("No robot is connected");

@@ -1,4 +1,4 @@
-//! Loading a log on a worker thread.
+//! Loading logs on worker threads, for every page that takes one.
 
 use std::fs::File;
 use std::io::BufReader;
@@ -12,58 +12,58 @@ use flqr_core::record::{
 use crate::job::{Job, Outcome, Reporter, Waker};
 
 /// A log in memory with what the page says about it.
-pub(super) struct LoadedLog {
-    pub(super) log: Arc<Log>,
-    pub(super) path: PathBuf,
+pub(crate) struct LoadedLog {
+    pub(crate) log: Arc<Log>,
+    pub(crate) path: PathBuf,
     /// What it records, or why nothing in it can be fitted.
-    pub(super) kind: Result<LogKind, String>,
-    pub(super) health: Vec<HealthFinding>,
+    pub(crate) kind: Result<LogKind, String>,
+    pub(crate) health: Vec<HealthFinding>,
     /// Horizontal axis of the preview: time where it is usable, else row numbers.
-    pub(super) axis: Axis,
+    pub(crate) axis: Axis,
     /// Rows a second, where there is a time.
-    pub(super) rate_hz: Option<f64>,
+    pub(crate) rate_hz: Option<f64>,
     /// Distinguishes logs, for the plot's cache.
-    pub(super) generation: u64,
+    pub(crate) generation: u64,
 }
 
 /// Horizontal values for the preview.
-pub(super) struct Axis {
-    pub(super) values: Vec<f64>,
-    pub(super) label: &'static str,
+pub(crate) struct Axis {
+    pub(crate) values: Vec<f64>,
+    pub(crate) label: &'static str,
     /// A larger step is a gap.
-    pub(super) gap: f64,
+    pub(crate) gap: f64,
 }
 
 /// How far loading has come.
 #[derive(Clone, Copy)]
-pub(super) struct LoadProgress {
-    pub(super) bytes: u64,
-    pub(super) total_bytes: u64,
-    pub(super) rows: u64,
+pub(crate) struct LoadProgress {
+    pub(crate) bytes: u64,
+    pub(crate) total_bytes: u64,
+    pub(crate) rows: u64,
 }
 
 type LoadResult = Result<Box<LoadedLog>, String>;
 
 /// The log in memory and the one that is being loaded.
 #[derive(Default)]
-pub(super) struct Loader {
+pub(crate) struct Loader {
     job: Option<Job<LoadProgress, LoadResult>>,
-    pub(super) progress: Option<LoadProgress>,
-    pub(super) problem: Option<String>,
+    pub(crate) progress: Option<LoadProgress>,
+    pub(crate) problem: Option<String>,
     log: Option<Box<LoadedLog>>,
     generation: u64,
 }
 
 impl Loader {
-    pub(super) fn log(&self) -> Option<&LoadedLog> {
+    pub(crate) fn log(&self) -> Option<&LoadedLog> {
         self.log.as_deref()
     }
 
-    pub(super) fn is_running(&self) -> bool {
+    pub(crate) fn is_running(&self) -> bool {
         self.job.is_some()
     }
 
-    pub(super) fn start(&mut self, path: &Path, map: ColumnMap, waker: &Waker) -> Result<(), String> {
+    pub(crate) fn start(&mut self, path: &Path, map: ColumnMap, waker: &Waker) -> Result<(), String> {
         self.generation += 1;
         let (path, generation) = (path.to_owned(), self.generation);
         let job = Job::start("load-log", waker, move |reporter| load(&path, &map, generation, reporter))
@@ -74,14 +74,14 @@ impl Loader {
         Ok(())
     }
 
-    pub(super) fn cancel(&self) {
+    pub(crate) fn cancel(&self) {
         if let Some(job) = &self.job {
             job.cancel();
         }
     }
 
     /// The log of before stays until another one is complete.
-    pub(super) fn drain(&mut self) -> Option<String> {
+    pub(crate) fn drain(&mut self) -> Option<String> {
         let (progress, outcome) = self.job.as_mut()?.poll();
         self.progress = progress.last().copied().or(self.progress);
         let result = match outcome {
@@ -104,7 +104,7 @@ impl Loader {
         })
     }
 
-    pub(super) fn snapshot(&self) -> serde_json::Value {
+    pub(crate) fn snapshot(&self) -> serde_json::Value {
         serde_json::json!({
             "loading": self.is_running(),
             "problem": self.problem,

@@ -1,0 +1,60 @@
+//! What is wrong with data, in plain sentences with the mend.
+
+use egui::{ProgressBar, RichText, Ui};
+use flqr_core::record::{HealthFinding, Severity};
+
+use crate::load::{LoadedLog, Loader};
+use crate::theme::palette;
+use crate::widgets::warning_ui;
+
+/// Line problems that are shown one by one.
+const SHOWN_PROBLEMS: usize = 3;
+
+/// How far loading has come; nothing while nothing is loaded.
+pub(crate) fn progress_ui(loader: &Loader, ui: &mut Ui) {
+    if !loader.is_running() {
+        return;
+    }
+    let text = loader.progress.map_or_else(
+        || "opening".to_owned(),
+        |p| format!("{} rows, {:.1} of {:.1} MB", p.rows, p.bytes as f64 / 1e6, p.total_bytes as f64 / 1e6),
+    );
+    let share = loader.progress.map_or(0.0, |p| p.bytes as f32 / p.total_bytes.max(1) as f32);
+    ui.add(ProgressBar::new(share).text(RichText::new(text).small()));
+}
+
+/// One line for each finding.
+pub(crate) fn findings_ui<'a>(findings: impl IntoIterator<Item = &'a HealthFinding>, ui: &mut Ui) {
+    let colors = palette(ui.visuals());
+    for finding in findings {
+        let (mark, color) = match finding.severity {
+            Severity::Info => ("note", colors.measured),
+            Severity::Warning => ("warning", colors.warning),
+            Severity::Error => ("error", colors.error),
+        };
+        ui.horizontal_wrapped(|ui| {
+            ui.spacing_mut().item_spacing.x = 4.0;
+            ui.label(RichText::new(mark).small().strong().color(color));
+            if !finding.column.is_empty() {
+                ui.label(RichText::new(&finding.column).small().monospace());
+            }
+            ui.label(RichText::new(&finding.problem).small());
+            if !finding.mend.is_empty() {
+                ui.label(RichText::new(format!("→ {}", finding.mend)).small().weak());
+            }
+        });
+    }
+}
+
+/// The first rows and cells that could not be used, where they are in the file.
+pub(crate) fn line_problems_ui(loaded: &LoadedLog, ui: &mut Ui) {
+    let log = &loaded.log;
+    if log.problem_count == 0 {
+        return;
+    }
+    let count = format!("{} rows left out, {} problems in lines", log.dropped_rows, log.problem_count);
+    warning_ui(ui, count);
+    for problem in log.problems.iter().take(SHOWN_PROBLEMS) {
+        ui.label(RichText::new(problem.to_string()).small().weak());
+    }
+}

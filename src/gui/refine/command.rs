@@ -1,0 +1,38 @@
+//! What this page asks for.
+
+use std::path::PathBuf;
+
+use super::run::Question;
+use super::save::SavedAs;
+
+/// One wish of this page.
+#[derive(Clone, Debug)]
+pub(crate) enum RefineCommand {
+    /// Loads a log beside those that are there, or one of them again.
+    Load {
+        path: PathBuf,
+        held_out: bool,
+    },
+    /// Stops loading a log, or takes it from the list.
+    Remove(u64),
+    /// Whether a log takes no part in the estimates.
+    HoldOut(u64, bool),
+    /// Puts a question to the logs.
+    Start(Question),
+    Cancel,
+    /// Puts what was found into the session's model.
+    Use,
+    /// Saves the report or the refined model; an existing file is replaced only if `replace`.
+    Save {
+        saved_as: SavedAs,
+        path: PathBuf,
+        replace: bool,
+    },
+}
+
+/// What a file dialog of this page is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum RefineFile {
+    Log,
+    Save(SavedAs),
+}

@@ -1,0 +1,366 @@
+//! The *Refine* page: logs and search at the left, the steps of the loop above, one of them in the middle.
+
+mod command;
+mod compare;
+mod effects;
+mod form;
+mod health;
+mod run;
+mod save;
+mod sources;
+mod strip;
+
+use std::path::PathBuf;
+
+use egui::{CentralPanel, Frame, Margin, Panel, ScrollArea, Ui};
+use flqr_core::model_file::Model;
+use flqr_core::refine::{Refinement, Verdict};
+use flqr_core::report::{Block, Tone as ReportTone};
+
+use crate::column_map::ColumnMapForm;
+use crate::command::Command;
+use crate::context::ViewContext;
+use crate::job::Waker;
+use crate::session::Session;
+use crate::widgets::{hint_ui, section_ui, warning_ui};
+pub(crate) use command::{RefineCommand, RefineFile};
+pub(crate) use run::Question;
+use run::{Answered, Made, Run, Settings};
+pub(crate) use save::SavedAs;
+use save::Saver;
+use sources::Sources;
+use strip::{Step, StepState, Tone};
+
+/// State of the page.
+pub(crate) struct RefineTab {
+    sources: Sources,
+    settings: Settings,
+    run: Run,
+    saver: Saver,
+    step: Step,
+}
+
+/// What the page's commands may use of the window.
+pub(crate) struct Surroundings<'a> {
+    pub(crate) session: &'a mut Session,
+    /// The file that holds the very model of the session.
+    pub(crate) model_path: Option<PathBuf>,
+    pub(crate) waker: &'a Waker,
+}
+
+/// What a command of the page leaves for the window to do.
+#[derive(Default)]
+pub(crate) struct Done {
+    /// For the status line.
+    pub(crate) said: Option<String>,
+    /// A log to remember.
+    pub(crate) log: Option<PathBuf>,
+}
+
+/// How an answer stands to what is there now.
+enum Standing {
+    Fresh,
+    /// What was found is in the model.
+    InModel,
+    /// Model, logs or settings are others now; a sentence says which.
+    Stale(String),
+}
+
+impl RefineTab {
+    pub(crate) fn new(column_map: ColumnMapForm) -> Self {
+        Self {
+            sources: Sources::new(column_map),
+            settings: Settings::default(),
+            run: Run::default(),
+            saver: Saver::default(),
+            step: Step::default(),
+        }
+    }
+
+    /// Goes to the path of a log.
+    pub(crate) fn focus_path(&mut self) {
+        self.sources.focus_path();
+    }
+
+    pub(crate) fn has_logs(&self) -> bool {
+        !self.sources.list.is_empty()
+    }
+
+    pub(crate) fn is_running(&self) -> bool {
+        self.run.running().is_some()
+    }
+
+    pub(crate) fn note_dialog_problem(&mut self, purpose: RefineFile, problem: &str) {
+        match purpose {
+            RefineFile::Log => self.sources.dialog_problem = Some(problem.to_owned()),
+            RefineFile::Save(_) => self.saver.problem = Some(problem.to_owned()),
+        }
+    }
+
+    /// Does what the page asked for.
+    ///
+    /// # Errors
+    /// A sentence says why it was not done.
+    pub(crate) fn apply(&mut self, command: RefineCommand, around: Surroundings<'_>) -> Result<Done, String> {
+        let mut done = Done::default();
+        match command {
+            RefineCommand::Load { path, held_out } => {
+                self.sources.load(&path, held_out, around.waker)?;
+                done.log = Some(path);
+            }
+            RefineCommand::Remove(id) => self.sources.remove(id),
+            RefineCommand::HoldOut(id, held_out) => self.sources.hold_out(id, held_out),
+            RefineCommand::Start(question) => self.start(question, around)?,
+            RefineCommand::Cancel => self.run.cancel(),
+            RefineCommand::Use => done.said = Some(self.put_into(around.session)?),
+            RefineCommand::Save { saved_as, path, replace } => {
+                self.save(saved_as, path, replace, &around)?;
+            }
+        }
+        Ok(done)
+    }
+
+    fn start(&mut self, question: Question, around: Surroundings<'_>) -> Result<(), String> {
+        if let Some(why_not) = form::why_not(&self.sources) {
+            return Err(why_not.to_owned());
+        }
+        let made = self.made(around.session);
+        self.run.start(question, made, around.model_path, around.waker)
+    }
+
+    /// What a question put now would be made of.
+    fn made(&self, session: &Session) -> Made {
+        Made { model: session.model(), inputs: self.sources.inputs(), settings: self.settings.clone() }
+    }
+
+    fn standing<T>(&self, answered: &Answered<T>, refined: Option<&Model>, session: &Session) -> Standing {
+        let now = self.made(session);
+        let made = &answered.made;
+        if made.inputs == now.inputs && made.settings == now.settings {
+            return match () {
+                () if made.model == now.model => Standing::Fresh,
+                () if refined == Some(&now.model) => Standing::InModel,
+                () => Standing::Stale("The model was changed after this: search again.".to_owned()),
+            };
+        }
+        let what = if made.inputs == now.inputs { "settings" } else { "logs" };
+        Standing::Stale(format!("This was made with other {what}: search again for these."))
+    }
+
+    fn standing_of_refined(&self, session: &Session) -> Option<Standing> {
+        let refined = self.run.refined.as_ref()?;
+        Some(self.standing(refined, Some(&refined.answer.model), session))
+    }
+
+    fn found(&self) -> Option<&Refinement> {
+        self.run.refined.as_ref().map(|refined| &*refined.answer)
+    }
+
+    fn put_into(&self, session: &mut Session) -> Result<String, String> {
+        let Some(refined) = &self.run.refined else {
+            return Err("There is nothing to put into the model: search first.".to_owned());
+        };
+        match self.standing_of_refined(session) {
+            Some(Standing::Stale(why)) => return Err(why),
+            Some(Standing::InModel) => return Err("It is in the model already.".to_owned()),
+            Some(Standing::Fresh) | None => {}
+        }
+        session.rig = refined.answer.model.rig.clone();
+        Ok("The model has what was found; the simulated robot too.".to_owned())
+    }
+
+    fn save(
+        &mut self,
+        saved_as: SavedAs,
+        path: PathBuf,
+        replace: bool,
+        around: &Surroundings<'_>,
+    ) -> Result<(), String> {
+        let Some(refined) = &self.run.refined else {
+            return Err("There is nothing to save: search first.".to_owned());
+        };
+        let remark = match self.standing(refined, Some(&refined.answer.model), around.session) {
+            Standing::Stale(why) => Some(format!("Stale when it was saved. {why}")),
+            Standing::Fresh | Standing::InModel => None,
+        };
+        let (mut document, model) = (refined.answer.document.clone(), refined.answer.model.clone());
+        let said = remark.clone();
+        let content = move || match saved_as {
+            SavedAs::Report => {
+                if let Some(remark) = said {
+                    document.blocks.insert(0, Block::notice(ReportTone::Warning, "Stale", remark));
+                }
+                document.to_html()
+            }
+            SavedAs::Model => {
+                let remark = said.map(|remark| format!("# {remark}\n")).unwrap_or_default();
+                remark + &model.to_toml()
+            }
+        };
+        self.saver.start((saved_as, path, replace), content, remark, around.waker)
+    }
+
+    /// Name that a dialog offers.
+    pub(crate) fn suggested_name(&self, saved_as: SavedAs) -> String {
+        format!("refined.{}", saved_as.extension())
+    }
+
+    /// Takes in what the workers have brought; a sentence if something ended.
+    pub(crate) fn drain(&mut self) -> Option<String> {
+        let loaded = self.sources.drain();
+        let Some((question, text)) = self.run.drain() else { return loaded };
+        if self.run.problem.is_none() {
+            self.step = match (question, self.found().map(|found| found.verdict)) {
+                (Question::Residual, _) => Step::Residual,
+                (Question::Refine, Some(Verdict::DataUnfit)) => Step::Health,
+                (Question::Refine, _) => Step::Add,
+            };
+        }
+        Some(text)
+    }
+
+    /// A sentence when something was saved, or could not be.
+    pub(crate) fn drain_saver(&mut self) -> Option<Result<String, String>> {
+        self.saver.drain()
+    }
+
+    /// What the page shows, as `--state-out` writes it.
+    pub(crate) fn snapshot(&self, session: &Session) -> serde_json::Value {
+        let standing = self.standing_of_refined(session).map(|standing| match standing {
+            Standing::Fresh => "fresh",
+            Standing::InModel => "in_model",
+            Standing::Stale(_) => "stale",
+        });
+        let command = self
+            .run
+            .refined
+            .as_ref()
+            .map(|refined| refined.made.command_line(Question::Refine, refined.model_path.as_deref()));
+        serde_json::json!({
+            "step": self.step.key(),
+            "logs": self.sources.snapshot(),
+            "running": self.run.running().map(|(question, _)| question.name()),
+            "problem": self.run.problem,
+            "residual": self.run.residual.as_ref().map(|residual| &residual.answer),
+            "refinement": self.found(),
+            "standing": standing,
+            "command": command,
+        })
+    }
+
+    pub(crate) fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
+        let side = Frame::side_top_panel(ui.style()).inner_margin(Margin::symmetric(10, 6));
+        let states = self.states(context.session);
+        Panel::top("steps of the loop").frame(side).show(ui, |ui| strip::ui(&mut self.step, &states, ui));
+        Panel::left("refine sources")
+            .frame(side)
+            .resizable(true)
+            .default_size(330.0)
+            .size_range(280.0..=480.0)
+            .show(ui, |ui| {
+                ScrollArea::vertical().show(ui, |ui| {
+                    self.sources.ui(context, ui);
+                    form::ui(context, &mut self.settings, &self.sources, &self.run, ui);
+                    self.commands_ui(context, ui);
+                    if self.run.refined.is_some() {
+                        self.saver.ui(context, ui);
+                    }
+                });
+            });
+        let middle = Frame::central_panel(ui.style()).inner_margin(Margin::symmetric(10, 6));
+        CentralPanel::default().frame(middle).show(ui, |ui| {
+            ScrollArea::vertical().auto_shrink(false).show(ui, |ui| self.step_ui(context, ui));
+        });
+    }
+
+    fn states(&self, session: &Session) -> [StepState; 5] {
+        let found = self.found();
+        let standing = self.standing_of_refined(session);
+        let in_model = matches!(standing, Some(Standing::InModel));
+        let mut states = [
+            health::state(&self.run, &self.sources),
+            self.residual_state(),
+            effects::state(found, in_model),
+            effects::state(found, in_model),
+            compare::state(found),
+        ];
+        if let Some((question, share)) = self.run.running() {
+            let step = if question == Question::Residual { Step::Residual } else { Step::Candidates };
+            states[step as usize] = StepState::new(format!("at work, {:.0} %", 100.0 * share), Tone::Busy);
+        }
+        if let Some(Standing::Stale(_)) = standing {
+            for state in &mut states[1..] {
+                if state.tone != Tone::Busy && state.tone != Tone::Open {
+                    *state = StepState::new(format!("{} · stale", state.text), Tone::Warning);
+                }
+            }
+        }
+        states
+    }
+
+    fn residual_state(&self) -> StepState {
+        StepState::new("not worked out", Tone::Open)
+    }
+
+    fn step_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
+        if let (Some(Standing::Stale(why)), true) =
+            (self.standing_of_refined(context.session), self.step != Step::Health)
+        {
+            warning_ui(ui, why);
+        }
+        match self.step {
+            Step::Health => health::ui(&self.run, &self.sources, ui),
+            Step::Residual => match &self.run.residual {
+                Some(residual) => compare::residual_ui(&residual.answer, ui),
+                None => nothing_yet_ui(ui),
+            },
+            Step::Candidates | Step::Add => self.add_ui(context, ui),
+            Step::Compare => match self.found() {
+                Some(found) => compare::ui(found, ui),
+                None => nothing_yet_ui(ui),
+            },
+        }
+    }
+
+    fn add_ui(&self, context: &ViewContext<'_>, ui: &mut Ui) {
+        let Some(found) = self.found() else { return nothing_yet_ui(ui) };
+        effects::verdict_ui(found, ui);
+        for effect in &found.effects {
+            effects::effect_ui(effect, ui);
+        }
+        let ready = matches!(self.standing_of_refined(context.session), Some(Standing::Fresh));
+        let button =
+            ui.add_enabled(ready && !found.effects.is_empty(), egui::Button::new("Use in the model"));
+        if button.on_hover_text("Put what was found into the model of this window").clicked() {
+            context.commands.send(Command::Refine(RefineCommand::Use));
+        }
+    }
+
+    /// Copies the command that gives the same answer.
+    fn commands_ui(&self, context: &ViewContext<'_>, ui: &mut Ui) {
+        let made = self.made(context.session);
+        if made.inputs.iter().all(|input| input.held_out) {
+            return;
+        }
+        section_ui(ui, "Command", |ui| {
+            for question in [Question::Residual, Question::Refine] {
+                let line = made.command_line(question, context.model_path);
+                let button = ui.button(format!("Copy {}", question.name())).on_hover_text(&line);
+                if button.clicked() {
+                    ui.ctx().copy_text(line);
+                }
+            }
+        });
+        if context.model_path.is_none() {
+            hint_ui(ui, "No file holds this very model: save it, put its path in place of MODEL.toml.");
+        }
+    }
+}
+
+fn nothing_yet_ui(ui: &mut Ui) {
+    ui.add_space(0.3 * ui.available_height());
+    ui.vertical_centered(|ui| {
+        ui.label("Nothing was searched yet.");
+        hint_ui(ui, "Add a log at the left and press “Find what is missing”.");
+    });
+}

@@ -1,0 +1,239 @@
+//! A question to the logs on a worker thread, and the last answers with what they were made of.
+
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+
+use flqr_core::model_file::Model;
+use flqr_core::record::Log;
+use flqr_core::refine::{self, Options, RefineError, Refinement, Residual, Verdict};
+use flqr_core::robot::Motor;
+
+use super::sources::Input;
+use crate::job::{Job, Outcome, Reporter, Waker};
+use crate::shell_word::quoted;
+
+/// What can be asked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Question {
+    /// How far the model is from the logs.
+    Residual,
+    /// What the model lacks.
+    Refine,
+}
+
+impl Question {
+    /// As in the command line.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Residual => "residual",
+            Self::Refine => "refine",
+        }
+    }
+}
+
+/// What is typed beside the logs.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Settings {
+    /// Motor of a robot that a bench log belongs to.
+    pub(super) motor: Motor,
+    /// Parameters that are free, separated by commas.
+    pub(super) estimate: String,
+    pub(super) seed: u64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { motor: Motor::Left, estimate: String::new(), seed: 1 }
+    }
+}
+
+impl Settings {
+    fn names(&self) -> Vec<String> {
+        self.estimate.split([',', ' ']).filter(|name| !name.is_empty()).map(str::to_owned).collect()
+    }
+
+    fn options(&self) -> Options {
+        Options { motor: self.motor, estimate: self.names(), seed: self.seed }
+    }
+}
+
+/// What an answer was made of.
+#[derive(Clone, PartialEq)]
+pub(super) struct Made {
+    pub(super) model: Model,
+    pub(super) inputs: Vec<Input>,
+    pub(super) settings: Settings,
+}
+
+impl Made {
+    /// The command that gives the same answer; `model` is the file that holds this very model.
+    pub(super) fn command_line(&self, question: Question, model: Option<&Path>) -> String {
+        let file = |path: &Path| quoted(&path.display().to_string());
+        let mut line = format!("flqr {} {}", question.name(), model.map_or("MODEL.toml".into(), file));
+        for input in self.inputs.iter().filter(|input| !input.held_out || question == Question::Residual) {
+            line += &format!(" {}", file(&input.path));
+        }
+        for input in self.inputs.iter().filter(|input| input.held_out && question == Question::Refine) {
+            line += &format!(" --heldout {}", file(&input.path));
+        }
+        let mut maps: Vec<String> = Vec::new();
+        for mapping in self.inputs.iter().flat_map(|input| &input.map) {
+            let word = quoted(&mapping.to_string());
+            if !maps.contains(&word) {
+                line += &format!(" --map {word}");
+                maps.push(word);
+            }
+        }
+        let names = self.settings.names();
+        if !names.is_empty() {
+            line += &format!(" --estimate {}", quoted(&names.join(",")));
+        }
+        if self.settings.motor == Motor::Right {
+            line += " --motor right";
+        }
+        format!("{line} --seed {}", self.settings.seed)
+    }
+}
+
+/// An answer and what it was made of.
+pub(super) struct Answered<T> {
+    pub(super) made: Made,
+    /// The file that held the model when the question was put.
+    pub(super) model_path: Option<PathBuf>,
+    pub(super) answer: T,
+    /// Differs from that of any other answer.
+    pub(super) generation: u64,
+}
+
+enum Answer {
+    Residual(Box<Residual>),
+    Refined(Box<Refinement>),
+}
+
+enum End {
+    Answered(Answer),
+    Cancelled,
+    Refused(String),
+}
+
+struct Running {
+    question: Question,
+    made: Made,
+    model_path: Option<PathBuf>,
+    job: Job<f64, End>,
+    share: f64,
+}
+
+/// Puts questions, watches and ends them.
+#[derive(Default)]
+pub(super) struct Run {
+    running: Option<Running>,
+    pub(super) residual: Option<Answered<Box<Residual>>>,
+    pub(super) refined: Option<Answered<Box<Refinement>>>,
+    pub(super) problem: Option<String>,
+    generation: u64,
+}
+
+impl Run {
+    /// The question that is being answered, and how much of the work is done.
+    pub(super) fn running(&self) -> Option<(Question, f64)> {
+        self.running.as_ref().map(|running| (running.question, running.share))
+    }
+
+    /// Starts; the answers of before stay until there is another one.
+    pub(super) fn start(
+        &mut self,
+        question: Question,
+        made: Made,
+        model_path: Option<PathBuf>,
+        waker: &Waker,
+    ) -> Result<(), String> {
+        let work = {
+            let made = made.clone();
+            move |reporter: &Reporter<f64>| answer(question, &made, &mut |share| reporter.progress(share))
+        };
+        let job = Job::start("refine", waker, work).map_err(|e| format!("No thread for the search: {e}."))?;
+        self.problem = None;
+        self.running = Some(Running { question, made, model_path, job, share: 0.0 });
+        Ok(())
+    }
+
+    pub(super) fn cancel(&self) {
+        if let Some(running) = &self.running {
+            running.job.cancel();
+        }
+    }
+
+    /// The question that has been answered or not, with a sentence about it.
+    pub(super) fn drain(&mut self) -> Option<(Question, String)> {
+        let running = self.running.as_mut()?;
+        let (shares, outcome) = running.job.poll();
+        running.share = shares.last().copied().unwrap_or(running.share);
+        let end = match outcome {
+            Outcome::Running => return None,
+            Outcome::Done(end) => end,
+            Outcome::Broken => End::Refused("The search failed: this is a defect of flqr".to_owned()),
+        };
+        let Running { question, made, model_path, .. } = self.running.take()?;
+        self.generation += 1;
+        let generation = self.generation;
+        let text = match end {
+            End::Cancelled => "Cancelled: what was found before is still shown.".to_owned(),
+            End::Refused(problem) => {
+                self.problem = Some(problem.clone());
+                format!("{problem}.")
+            }
+            End::Answered(Answer::Residual(answer)) => {
+                self.residual = Some(Answered { made, model_path, answer, generation });
+                "The residual of the model is there.".to_owned()
+            }
+            End::Answered(Answer::Refined(answer)) => {
+                let text = format!("{}.", verdict_text(&answer));
+                self.refined = Some(Answered { made, model_path, answer, generation });
+                text
+            }
+        };
+        Some((question, text))
+    }
+}
+
+fn answer(question: Question, made: &Made, watch: &mut dyn FnMut(f64) -> ControlFlow<()>) -> End {
+    let logs = |held_out: bool| -> Vec<Log> {
+        let of_part = made.inputs.iter().filter(|input| input.held_out == held_out);
+        of_part.map(|input| (*input.log).clone()).collect()
+    };
+    let (mut logs, held_out) = (logs(false), logs(true));
+    let options = made.settings.options();
+    let answer = match question {
+        Question::Residual => {
+            logs.extend(held_out);
+            refine::residual(&made.model, &logs, &options, watch)
+                .map(|residual| Answer::Residual(Box::new(residual)))
+        }
+        Question::Refine => refine::refine(&made.model, &logs, &held_out, &options, watch)
+            .map(|refined| Answer::Refined(Box::new(refined))),
+    };
+    match answer {
+        Ok(answer) => End::Answered(answer),
+        Err(RefineError::Cancelled) => End::Cancelled,
+        Err(problem) => End::Refused(problem.to_string()),
+    }
+}
+
+/// The answer as a sentence without its full stop.
+pub(super) fn verdict_text(found: &Refinement) -> String {
+    match found.verdict {
+        Verdict::ModelAdequate => {
+            "Model adequate: no effect of the library explains the logs better".to_owned()
+        }
+        Verdict::EffectsFound => {
+            let ids: Vec<&str> = found.effects.iter().map(|found| found.effect.id()).collect();
+            format!("Effects found: {}", ids.join(", "))
+        }
+        Verdict::UnexplainedResidual => {
+            "Unexplained residual: the model lacks something that no effect of the library explains"
+                .to_owned()
+        }
+        Verdict::DataUnfit => "Data unfit: the logs cannot answer, for the reasons below".to_owned(),
+    }
+}

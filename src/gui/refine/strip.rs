@@ -1,0 +1,137 @@
+//! Where in the loop one is: health ▸ residual ▸ candidates ▸ add ▸ before and after.
+
+use egui::text::LayoutJob;
+use egui::{Align, Button, Color32, FontSelection, Layout, RichText, Ui, Vec2, vec2};
+
+use crate::theme::palette;
+
+/// A step of the loop, and the part of the page that shows it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Step {
+    /// Whether the logs can answer.
+    #[default]
+    Health,
+    /// How far the model is from them.
+    Residual,
+    /// What was tried.
+    Candidates,
+    /// What was found, and its way into the model.
+    Add,
+    /// The errors of both models.
+    Compare,
+}
+
+impl Step {
+    /// In the order of the loop.
+    pub(super) const ALL: [Self; 5] =
+        [Self::Health, Self::Residual, Self::Candidates, Self::Add, Self::Compare];
+
+    fn title(self) -> &'static str {
+        match self {
+            Self::Health => "Health",
+            Self::Residual => "Residual",
+            Self::Candidates => "Candidates",
+            Self::Add => "Add",
+            Self::Compare => "Before and after",
+        }
+    }
+
+    /// Name for scripts.
+    pub(super) fn key(self) -> &'static str {
+        match self {
+            Self::Health => "health",
+            Self::Residual => "residual",
+            Self::Candidates => "candidates",
+            Self::Add => "add",
+            Self::Compare => "compare",
+        }
+    }
+
+    fn help(self) -> &'static str {
+        match self {
+            Self::Health => "Whether the logs can answer, and what is wrong with them",
+            Self::Residual => "Measured against the model, and what the difference depends on",
+            Self::Candidates => "Every effect that was tried, and what became of it",
+            Self::Add => "What the logs show that the model lacks, and its way into the model",
+            Self::Compare => "Errors on rows that took no part in the estimates",
+        }
+    }
+}
+
+/// How a step stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Tone {
+    /// Nothing there yet.
+    Open,
+    Busy,
+    Good,
+    Plain,
+    Warning,
+    Error,
+}
+
+/// How a step stands, in a few words.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct StepState {
+    pub(super) text: String,
+    pub(super) tone: Tone,
+}
+
+impl StepState {
+    pub(super) fn new(text: impl Into<String>, tone: Tone) -> Self {
+        Self { text: text.into(), tone }
+    }
+
+    fn color(&self, ui: &Ui) -> Color32 {
+        let colors = palette(ui.visuals());
+        match self.tone {
+            Tone::Open => ui.visuals().weak_text_color(),
+            Tone::Plain => ui.visuals().text_color(),
+            Tone::Busy => colors.accent,
+            Tone::Good => colors.good,
+            Tone::Warning => colors.warning,
+            Tone::Error => colors.error,
+        }
+    }
+}
+
+/// Width of the arrow between two steps.
+const ARROW: f32 = 14.0;
+const HEIGHT: f32 = 38.0;
+
+/// Draws the steps; a click shows one.
+pub(super) fn ui(shown: &mut Step, states: &[StepState; 5], ui: &mut Ui) {
+    ui.spacing_mut().item_spacing.x = 2.0;
+    let count = Step::ALL.len() as f32;
+    let gaps = (count - 1.0) * (ARROW + 2.0 * ui.spacing().item_spacing.x);
+    let width = ((ui.available_width() - gaps) / count).max(1.0);
+    ui.horizontal(|ui| {
+        for (step, state) in Step::ALL.into_iter().zip(states) {
+            if step != Step::ALL[0] {
+                let arrow = egui::Label::new(RichText::new("▸").weak());
+                ui.add_sized(vec2(ARROW, HEIGHT), arrow.selectable(false));
+            }
+            step_ui(shown, step, state, ui, vec2(width, HEIGHT));
+        }
+    });
+}
+
+fn step_ui(shown: &mut Step, step: Step, state: &StepState, ui: &mut Ui, size: Vec2) {
+    let mut text = LayoutJob::default();
+    let (style, font) = (ui.style().clone(), FontSelection::Default);
+    let title = RichText::new(format!("{}  {}\n", step as usize + 1, step.title())).strong();
+    title.append_to(&mut text, &style, font.clone(), Align::Center);
+    RichText::new(&state.text).small().color(state.color(ui)).append_to(
+        &mut text,
+        &style,
+        font,
+        Align::Center,
+    );
+    let layout = Layout::centered_and_justified(egui::Direction::LeftToRight);
+    let button = Button::selectable(*shown == step, text).wrap_mode(egui::TextWrapMode::Truncate);
+    let button = ui.allocate_ui_with_layout(size, layout, |ui| ui.add_sized(size, button)).inner;
+    let button = button.on_hover_text(format!("{}\n{}", step.help(), state.text));
+    if button.accessible_name(format!("step {}: {}", step.key(), state.text)).clicked() {
+        *shown = step;
+    }
+}

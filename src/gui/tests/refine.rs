@@ -1,0 +1,117 @@
+//! The Refine page: logs, the search, what was found and its way into the model; driven by the names of its controls.
+
+#![expect(clippy::unwrap_used, reason = "helpers of tests, where a panic is the report")]
+
+mod common;
+
+use std::ops::ControlFlow;
+
+use common::{SIZE, TempFile, Window, click, enter, open, options, random_input, state, until};
+use egui::{Key, Modifiers, Vec2, vec2};
+use egui_kittest::kittest::Queryable;
+use flqr_core::model_file::Model;
+use flqr_core::record::write_log;
+use flqr_core::robot::Motor;
+use flqr_core::simulate::{ControllerChoice, Experiment, Scenario, run};
+use flqr_gui::{Tab, WindowOptions};
+use serde_json::Value;
+
+const SHAFT: &str = r#"
+name = "Shaft"
+[axis]
+kind = "rotary"
+inertia_kg_m2 = 0.005
+[friction]
+coulomb_nm = 0.03
+viscous_nm_s_rad = 0.0005
+"#;
+
+/// What the declared shaft lacks.
+const COGGING: &str = "\n[[effects]]\nid = \"cogging\"\norder_1 = 14\nsin_1_nm = 0.01\ncos_1_nm = 0.0\n";
+
+/// A log of the shaft with what `hidden` adds to its model, as CSV.
+fn log_csv(hidden: &str, seed: u64) -> String {
+    let model = |text: &str| Model::from_toml(text, "shaft.toml").unwrap();
+    let declared = model(SHAFT);
+    let experiment =
+        Experiment { seconds: 12.0, seed, ..Experiment::new(Scenario::Multisine, ControllerChoice::Pi) };
+    let actual = model(&format!("{SHAFT}{hidden}"));
+    let outcome = run(&experiment, &declared, &actual, &mut |_| ControlFlow::Continue(())).unwrap();
+    let mut text = Vec::new();
+    write_log(&outcome.log(Motor::Left), &mut text).unwrap();
+    String::from_utf8(text).unwrap()
+}
+
+fn page() -> Window {
+    let model = Model::from_toml(SHAFT, "shaft.toml").unwrap();
+    open(WindowOptions { model, ..options(Tab::Refine) }, SIZE)
+}
+
+fn add(window: &mut Window, log: &TempFile) {
+    let logs = |s: &Value| s["refine_tab"]["logs"].as_array().map_or(0, Vec::len);
+    let before = logs(&state(window));
+    enter(window, "path of a log", log.name());
+    until(window, "loading", |s| logs(s) > before && s["refine_tab"]["logs"][before]["loading"] == false);
+}
+
+fn search(window: &mut Window) -> Value {
+    click(window, "Find what is missing");
+    until(window, "the search", |s| s["refine_tab"]["running"].is_null())
+}
+
+#[test]
+fn what_a_log_shows_is_found_and_goes_into_the_model() {
+    let log = TempFile::new("cogging.csv", &log_csv(COGGING, 1));
+    let mut window = page();
+    window.get_by_label("No log yet.");
+    add(&mut window, &log);
+    let found = search(&mut window);
+    let tab = &found["refine_tab"];
+    assert_eq!(tab["refinement"]["verdict"], "effects_found", "{tab:#}");
+    let effects = tab["refinement"]["effects"].as_array().unwrap();
+    assert!(effects.iter().any(|effect| effect["id"] == "cogging"), "{tab:#}");
+    assert_eq!((&tab["step"], &tab["standing"]), (&"add".into(), &"fresh".into()));
+    assert_eq!(tab["command"], format!("flqr refine MODEL.toml {} --seed 1", log.name()));
+    click(&mut window, "Use in the model");
+    let used = state(&window);
+    assert_eq!(used["unsaved_changes"], true);
+    assert_eq!(used["refine_tab"]["standing"], "in_model");
+}
+
+#[test]
+fn a_search_is_cancelled_with_the_keyboard() {
+    let log = TempFile::new("cancelled.csv", &log_csv("", 2));
+    let mut window = page();
+    add(&mut window, &log);
+    window.key_press_modifiers(Modifiers::COMMAND, Key::Enter);
+    window.step();
+    assert_eq!(state(&window)["refine_tab"]["running"], "refine");
+    window.key_press_modifiers(Modifiers::COMMAND, Key::Enter);
+    let ended = until(&mut window, "the end", |s| s["refine_tab"]["running"].is_null());
+    assert!(ended["refine_tab"]["refinement"].is_null(), "{ended:#}");
+    assert!(ended["message"].as_str().unwrap().starts_with("Cancelled"), "{ended:#}");
+}
+
+#[test]
+fn a_file_that_is_not_there_is_said_in_its_place() {
+    let log = TempFile::new("vanished.csv", "");
+    std::fs::remove_file(&log.0).unwrap();
+    let mut window = page();
+    add(&mut window, &log);
+    window.query_all_by_label_contains("could not be opened").next().unwrap();
+    window.get_by_label("step health: 1 error");
+    window.get_by_label("Needs a log that is not held out.");
+}
+
+#[test]
+fn the_page_survives_any_size_and_any_input() {
+    let log = TempFile::new("sizes.csv", &log_csv(COGGING, 3));
+    let mut window = page();
+    add(&mut window, &log);
+    search(&mut window);
+    for size in [Vec2::ZERO, vec2(1.0, 1.0), vec2(300.0, 200.0), vec2(1920.0, 1080.0), SIZE] {
+        window.set_size(size);
+        window.run_steps(3);
+    }
+    random_input(&mut window, 11);
+}
