@@ -46,6 +46,7 @@ enum TabName {
     Refine,
     Experiments,
     Robot,
+    Log,
 }
 
 pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
@@ -58,6 +59,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
         (Some(TabName::Refine), _) => Tab::Refine,
         (Some(TabName::Experiments), _) => Tab::Experiments,
         (Some(TabName::Robot), _) => Tab::Robot,
+        (Some(TabName::Log), _) => Tab::Log,
         (Some(TabName::Tune), _) | (None, None) => Tab::Tune,
     };
     let options = WindowOptions {

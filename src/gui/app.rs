@@ -15,6 +15,7 @@ use flqr_core::model_file::Model;
 
 use crate::column_map::ColumnMapForm;
 use crate::command::{Command, Commands, FilePurpose, Source};
+use crate::commands::{Palette, Situation};
 use crate::context::ViewContext;
 use crate::design::Designer;
 use crate::dialog::{Answer, Dialog};
@@ -22,37 +23,17 @@ use crate::experiments::ExperimentsTab;
 use crate::friction::FrictionTab;
 use crate::history::{Channel, History};
 use crate::job::{Job, Outcome, Waker};
+use crate::layout::{Layout, Node};
 use crate::live::{Live, LiveCommand};
+use crate::messages::{Messages, Severity};
 use crate::recent::{Recent, RecentFile};
 use crate::refine::{RefineCommand, RefineTab};
 use crate::robot::{Link, RobotTab, sentence};
 use crate::session::Session;
 use crate::state_out::StateOut;
+use crate::tab::Tab;
 use crate::tune::TuneTab;
 use crate::window::WindowOptions;
-
-/// The pages of the window.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Tab {
-    /// Weights, gains and the live robot.
-    #[default]
-    Tune,
-    /// Friction from a measured log.
-    Friction,
-    /// What the model lacks, from measured logs.
-    Refine,
-    /// The paper's experiments on the simulated robot.
-    Experiments,
-    /// A real robot: connection, health, arming, recording.
-    Robot,
-}
-
-/// The last message, for the status line.
-#[derive(Default)]
-struct Status {
-    text: String,
-    is_error: bool,
-}
 
 /// How saving ended.
 enum Saved {
@@ -73,7 +54,10 @@ pub struct App {
     /// The session as loaded or saved last, for the mark of unsaved changes and for Reset.
     saved: Session,
     model_path: Option<PathBuf>,
+    /// The page that the user turned to last: what keys are about.
     tab: Tab,
+    layout: Layout,
+    palette: Option<Palette>,
     source: Source,
     /// What the simulated robot goes back to when it is shown again.
     paused_before: bool,
@@ -87,7 +71,7 @@ pub struct App {
     link: Link,
     robot: RobotTab,
     commands: Commands,
-    status: Status,
+    messages: Messages,
     recent: Recent,
     recent_file: Option<RecentFile>,
     recent_job: Option<Job<(), Recent>>,
@@ -119,6 +103,8 @@ impl App {
             session,
             model_path: options.model_path,
             tab: options.tab,
+            layout: Layout::new(options.tab),
+            palette: None,
             source: Source::default(),
             paused_before: options.paused,
             designer: Designer::default(),
@@ -130,7 +116,7 @@ impl App {
             link: Link::new(options.devices),
             robot: RobotTab::default(),
             commands: Commands::default(),
-            status: Status::default(),
+            messages: Messages::default(),
             recent: Recent::default(),
             recent_job: read_recent(options.recent_file.clone(), &waker)?,
             recent_file: options.recent_file.map(RecentFile::new),
@@ -171,7 +157,7 @@ impl App {
         self.drain_link();
         self.drain_jobs();
         self.take_dropped_files(ctx);
-        if self.tab == Tab::Experiments {
+        if self.layout.shows(Tab::Experiments) {
             self.experiments.advance(ctx);
         }
         for command in self.commands.take() {
@@ -190,6 +176,29 @@ impl App {
         }
     }
 
+    /// What decides which commands can be given.
+    fn situation(&self, ctx: &Context) -> Situation<'_> {
+        Situation {
+            tab: self.tab,
+            source: self.source,
+            paused: self.live.status.paused,
+            replay_is_paused: self.link.replay_is_paused,
+            has_robot: self.session.robot().is_some(),
+            has_reference: self.designer.reference.is_some(),
+            has_log: self.friction.has_log(),
+            fit_runs: self.friction.fit_is_running(),
+            refine_runs: self.refine.is_running(),
+            experiment_runs: self.experiments.is_running(),
+            is_connected: self.link.options().is_some(),
+            is_hot: self.link.is_hot(),
+            controller: self.session.controller,
+            model_path: self.model_path.as_deref(),
+            is_dark: ctx.global_style().visuals.dark_mode,
+            zoom: ctx.zoom_factor(),
+            is_usual_layout: self.layout.node().is_alike(&Node::default()),
+        }
+    }
+
     fn page_ui(&mut self, ui: &mut Ui) {
         let context = ViewContext {
             session: &self.session,
@@ -202,25 +211,25 @@ impl App {
             source: self.source,
             commands: &self.commands,
         };
-        let stop = match self.tab {
-            Tab::Robot => self.robot.ui(&context, ui),
-            Tab::Tune => {
-                self.tune.ui(&context, ui);
-                false
-            }
-            Tab::Friction => {
-                self.friction.ui(&context, ui);
-                false
-            }
-            Tab::Refine => {
-                self.refine.ui(&context, ui);
-                false
-            }
-            Tab::Experiments => {
-                self.experiments.ui(&context, ui);
-                false
-            }
-        };
+        let (tune, friction, experiments) = (&mut self.tune, &mut self.friction, &mut self.experiments);
+        let (refine, robot, messages) = (&mut self.refine, &mut self.robot, &mut self.messages);
+        let mut stop = false;
+        let before = self.layout.shown().to_vec();
+        let turned_to = self.layout.ui(ui, &mut |tab, ui| match tab {
+            Tab::Tune => tune.ui(&context, ui),
+            Tab::Friction => friction.ui(&context, ui),
+            Tab::Refine => refine.ui(&context, ui),
+            Tab::Experiments => experiments.ui(&context, ui),
+            Tab::Robot => stop |= robot.ui(&context, ui),
+            Tab::Log => messages.ui(ui),
+        });
+        let front = || self.layout.shown().first().copied().filter(|_| !self.layout.shows(self.tab));
+        if let Some(tab) = turned_to.or_else(front) {
+            self.tab = tab;
+        }
+        if self.layout.shown() != before {
+            self.set_live_interval();
+        }
         if stop {
             self.link.stop();
         }
@@ -348,11 +357,11 @@ impl App {
     }
 
     fn say(&mut self, text: impl Into<String>) {
-        self.status = Status { text: text.into(), is_error: false };
+        self.messages.add(Severity::Note, text);
     }
 
     fn fail(&mut self, text: impl Into<String>) {
-        self.status = Status { text: text.into(), is_error: true };
+        self.messages.add(Severity::Error, text);
     }
 
     /// The running robot gets new gains; the first gains of a model start it.
@@ -414,13 +423,6 @@ impl App {
     pub fn snapshot(&self) -> serde_json::Value {
         let weights = self.session.weights();
         let design = self.designer.in_force.map(|designed| designed.design);
-        let tab = match self.tab {
-            Tab::Tune => "tune",
-            Tab::Friction => "friction",
-            Tab::Refine => "refine",
-            Tab::Experiments => "experiments",
-            Tab::Robot => "robot",
-        };
         let controller = match self.session.controller {
             ControllerKind::Lqr => "lqr",
             ControllerKind::Flqr => "flqr",
@@ -431,7 +433,9 @@ impl App {
         serde_json::json!({
             "model": self.session.name,
             "unsaved_changes": self.session != self.saved,
-            "tab": tab,
+            "tab": self.tab.key(),
+            "shown": self.layout.shown().iter().map(|tab| tab.key()).collect::<Vec<_>>(),
+            "layout": self.layout.node().to_value(),
             "source": self.source.key(),
             "controller": controller,
             "q_diagonal": weights.q.diagonal().as_slice(),
@@ -451,7 +455,7 @@ impl App {
             "refine_tab": self.refine.snapshot(&self.session),
             "experiments_tab": self.experiments.snapshot(),
             "robot_tab": self.robot.snapshot(&self.link),
-            "message": self.status.text,
+            "message": self.messages.newest().map(|message| &message.text),
         })
     }
 }

@@ -9,9 +9,10 @@ use flqr_core::friction::{Compensation, Stribeck};
 use flqr_core::lqr::Weights;
 use flqr_core::robot::RobotParameters;
 
-use crate::app::Tab;
 use crate::experiments::SavedAs;
+use crate::layout::Side;
 use crate::refine::{RefineCommand, RefineFile};
+use crate::tab::Tab;
 
 /// Where measured values come from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -89,6 +90,20 @@ pub(crate) enum FilePurpose {
 #[derive(Clone, Debug)]
 pub(crate) enum Command {
     SelectTab(Tab),
+    /// Gives a page a tile of its own, or takes it back to the others.
+    MoveTab(Tab, Side),
+    ResetLayout,
+    SetDark(bool),
+    SetZoom(f32),
+    ShowPalette,
+    /// Goes to the first weight.
+    FocusWeights,
+    /// Goes to the path of the log, or of what an experiment is saved to.
+    FocusPath,
+    /// Closes the window, after a question where something is not saved.
+    Quit,
+    /// Takes the torque off a robot.
+    Stop,
     SelectSource(Source),
     SetWeights(Weights),
     /// A drag of a weight begins: the gains of now are the ones to compare with.

@@ -7,8 +7,9 @@ use flqr_core::device::{SerialAddress, Source};
 use flqr_core::model_file::Model;
 use flqr_core::record::Mapping;
 
-use crate::app::{App, Tab};
+use crate::app::App;
 use crate::robot::{Devices, System};
+use crate::tab::Tab;
 
 /// How the window starts.
 #[derive(Clone, Debug)]

@@ -2,23 +2,29 @@
 
 use std::path::{Path, PathBuf};
 
-use egui::Context;
+use egui::{Context, Theme};
 use flqr_core::device::{SessionOptions, Source as DeviceSource};
 use flqr_core::model_file::{Model, presets};
 
-use super::{App, ModelJob, Saved, Tab};
+use super::{App, ModelJob, Saved};
 use crate::command::{Command, FilePurpose, Source, Target};
+use crate::commands::Palette;
 use crate::dialog::Dialog;
 use crate::friction::Fitted;
 use crate::job::{Job, Outcome};
+use crate::layout::Layout;
 use crate::live::LiveCommand;
 use crate::refine::{RefineCommand, RefineFile, Surroundings};
 use crate::session::Session;
+use crate::tab::Tab;
 
 /// A model file larger than this is none.
 const LARGEST_MODEL_BYTES: u64 = 1 << 20;
 /// Time between batches of the running robot while its plots are not shown.
 const HIDDEN_INTERVAL: std::time::Duration = std::time::Duration::from_millis(200);
+
+/// Smallest and largest size of everything.
+const ZOOMS: [f32; 2] = [0.5, 3.0];
 
 /// What to do with a chosen file.
 pub(super) fn chosen(purpose: FilePurpose, path: PathBuf) -> Command {
@@ -46,9 +52,27 @@ impl App {
         match command {
             Command::SelectTab(tab) => {
                 self.tab = tab;
-                self.set_live_interval();
+                self.layout.select(tab);
                 self.look_for_interfaces();
             }
+            Command::MoveTab(tab, side) => {
+                self.layout.move_tab(tab, side);
+                self.tab = tab;
+            }
+            Command::ResetLayout => {
+                self.layout = Layout::new(self.tab);
+                self.say("All pages are in one tile again.");
+            }
+            Command::SetDark(dark) => ctx.set_theme(if dark { Theme::Dark } else { Theme::Light }),
+            Command::SetZoom(zoom) => ctx.set_zoom_factor(zoom.clamp(ZOOMS[0], ZOOMS[1])),
+            Command::ShowPalette => self.palette = Some(Palette::default()),
+            Command::FocusWeights => {
+                self.commands.send(Command::SelectTab(Tab::Tune));
+                self.tune.focus_weights();
+            }
+            Command::FocusPath => self.focus_path(),
+            Command::Quit => ctx.send_viewport_cmd(egui::ViewportCommand::Close),
+            Command::Stop => self.link.stop(),
             Command::SelectSource(source) => self.select_source(source),
             Command::SetWeights(weights) => {
                 if let Some(robot) = self.session.robot_mut() {
@@ -130,11 +154,23 @@ impl App {
         ctx.request_repaint();
     }
 
-    fn set_live_interval(&mut self) {
+    fn focus_path(&mut self) {
+        match self.tab {
+            Tab::Experiments => self.experiments.focus_path(),
+            Tab::Refine => self.refine.focus_path(),
+            Tab::Tune | Tab::Friction | Tab::Robot | Tab::Log => {
+                self.commands.send(Command::SelectTab(Tab::Friction));
+                self.friction.focus_path();
+            }
+        }
+    }
+
+    pub(super) fn set_live_interval(&mut self) {
         let interval = |shown: bool| if shown { self.frame_interval } else { HIDDEN_INTERVAL };
         let simulated = self.source == Source::Simulated;
-        let live = interval(self.tab == Tab::Tune && simulated);
-        let link = interval(matches!(self.tab, Tab::Tune | Tab::Robot) && !simulated);
+        let live = interval(self.layout.shows(Tab::Tune) && simulated);
+        let robot = self.layout.shows(Tab::Tune) || self.layout.shows(Tab::Robot);
+        let link = interval(robot && !simulated);
         self.live.send(LiveCommand::Interval(live));
         self.link.set_interval(link);
     }

@@ -1,35 +1,18 @@
 //! The frame around the pages: tabs, source, theme, status line, shortcuts.
 
-use egui::{Event, Frame, Key, KeyboardShortcut, Margin, Modifiers, Panel, RichText, Theme, Ui};
+use egui::{Event, Frame, Margin, Panel, RichText, Ui};
 
-use flqr_core::device::{Connection, SessionOrder};
+use flqr_core::device::Connection;
 
-use super::{App, Tab};
-use crate::command::{Command, FilePurpose, Source};
-use crate::refine::{Question, RefineCommand, RefineFile};
+use super::App;
+use crate::command::{Command, Source};
+use crate::commands::{self, STOP_KEYS, keys_ui, menu_ui};
+use crate::layout::Side;
+use crate::messages::Severity;
 use crate::robot::bar_ui;
+use crate::tab::Tab;
 use crate::theme::palette;
 use crate::widgets::choice_ui;
-
-const fn ctrl(key: Key) -> KeyboardShortcut {
-    KeyboardShortcut::new(Modifiers::COMMAND, key)
-}
-
-/// Keys and what they do; shown in the help menu.
-const HELP: &[(&str, &str)] = &[
-    ("Esc, Space", "STOP a robot that is checked or driven: no torque, motors off"),
-    ("Ctrl+1 … Ctrl+5", "tune, friction, refine, experiments, robot"),
-    ("Ctrl+O", "open a model or a log"),
-    ("Ctrl+S", "save the model"),
-    ("Ctrl+E", "go to the first weight"),
-    ("Ctrl+L", "go to the path of the log, or of what an experiment is saved to"),
-    ("Ctrl+Enter", "start or cancel the fit, the search or the experiment; connect or disconnect the robot"),
-    ("Space, ←, →", "play, step (with Shift or Alt: longer, shorter) an experiment"),
-    ("Ctrl+P", "pause or run the simulated robot or the replay"),
-    ("Ctrl+D", "light or dark"),
-    ("Tab, Shift+Tab", "next, previous control"),
-    ("drag, wheel, double click", "move, zoom, follow again (plots)"),
-];
 
 impl App {
     pub(super) fn shell_ui(&mut self, ui: &mut Ui) {
@@ -45,107 +28,42 @@ impl App {
         }
         Panel::bottom("status").frame(bar).show(ui, |ui| self.status_ui(ui));
         self.page_ui(ui);
+        self.palette_ui(ui);
     }
 
     fn shortcuts(&mut self, ui: &Ui) {
         if self.link.is_hot() && take_stop_keys(ui) {
             self.link.stop();
         }
-        let pressed = |key| ui.input_mut(|input| input.consume_shortcut(&ctrl(key)));
-        let send = |command| self.commands.send(command);
-        if pressed(Key::Num1) {
-            send(Command::SelectTab(Tab::Tune));
+        if self.palette.is_some() {
+            return;
         }
-        if pressed(Key::Num2) {
-            send(Command::SelectTab(Tab::Friction));
+        let Some(entry) = commands::pressed(ui.ctx()) else { return };
+        match entry.send(&self.situation(ui.ctx())) {
+            Ok(command) => self.commands.send(command),
+            Err(reason) => self.commands.send(Command::Say(format!("{}: {reason}.", entry.name))),
         }
-        if pressed(Key::Num3) {
-            send(Command::SelectTab(Tab::Refine));
-        }
-        if pressed(Key::Num4) {
-            send(Command::SelectTab(Tab::Experiments));
-        }
-        if pressed(Key::Num5) {
-            send(Command::SelectTab(Tab::Robot));
-        }
-        if pressed(Key::O) {
-            send(Command::ShowDialog(match self.tab {
-                Tab::Robot if self.source == Source::Replay => FilePurpose::OpenReplay,
-                Tab::Robot => FilePurpose::OpenModel,
-                Tab::Tune | Tab::Experiments => FilePurpose::OpenModel,
-                Tab::Friction => FilePurpose::OpenLog,
-                Tab::Refine => FilePurpose::Refine(RefineFile::Log),
-            }));
-        }
-        if pressed(Key::S) {
-            send(match &self.model_path {
-                Some(path) => Command::SaveModel(path.clone()),
-                None => Command::ShowDialog(FilePurpose::SaveModel),
-            });
-        }
-        if pressed(Key::P) {
-            match self.source {
-                Source::Simulated => send(Command::SetPaused(!self.live.status.paused)),
-                Source::Replay => send(Command::Order(SessionOrder::Pause(!self.link.replay_is_paused))),
-                Source::Emulated | Source::Can | Source::Slcan => {}
-            }
-        }
-        if pressed(Key::Enter) {
-            match self.tab {
-                Tab::Tune => {}
-                Tab::Friction if self.friction.fit_is_running() => send(Command::CancelFit),
-                Tab::Friction => send(Command::StartFit),
-                Tab::Refine if self.refine.is_running() => send(Command::Refine(RefineCommand::Cancel)),
-                Tab::Refine => send(Command::Refine(RefineCommand::Start(Question::Refine))),
-                Tab::Experiments if self.experiments.is_running() => send(Command::CancelExperiment),
-                Tab::Experiments => send(Command::StartExperiment),
-                Tab::Robot if self.link.options().is_some() => send(Command::Disconnect),
-                Tab::Robot => send(Command::Connect),
-            }
-        }
-        if pressed(Key::D) {
-            switch_theme(ui);
-        }
-        if pressed(Key::E) {
-            send(Command::SelectTab(Tab::Tune));
-            self.tune.focus_weights();
-        }
-        if pressed(Key::L) {
-            match self.tab {
-                Tab::Experiments => self.experiments.focus_path(),
-                Tab::Refine => self.refine.focus_path(),
-                _ => {
-                    send(Command::SelectTab(Tab::Friction));
-                    self.friction.focus_path();
-                }
-            }
+    }
+
+    fn palette_ui(&mut self, ui: &Ui) {
+        let Some(mut palette) = self.palette.take() else { return };
+        if palette.ui(&self.situation(ui.ctx()), &self.commands, ui.ctx()) {
+            self.palette = Some(palette);
         }
     }
 
     fn head_ui(&mut self, ui: &mut Ui) {
         ui.horizontal(|ui| {
-            let mut tab = self.tab;
-            let tabs = [
-                (Tab::Tune, "Tune", "Weights, gains and the live robot (Ctrl+1)"),
-                (Tab::Friction, "Friction", "Friction from a measured log (Ctrl+2)"),
-                (Tab::Refine, "Refine", "What the model lacks, from measured logs (Ctrl+3)"),
-                (
-                    Tab::Experiments,
-                    "Experiments",
-                    "LQR and FLQR side by side on the simulated robot (Ctrl+4)",
-                ),
-                (Tab::Robot, "Robot", "Connection, health, arming and recording of a robot (Ctrl+5)"),
-            ];
+            menu_ui(&self.situation(ui.ctx()), &self.commands, ui);
             ui.scope(|ui| {
-                ui.spacing_mut().button_padding.x = 12.0;
-                if choice_ui(ui, &mut tab, &tabs) {
-                    self.commands.send(Command::SelectTab(tab));
-                }
+                ui.spacing_mut().button_padding.x = 10.0;
+                ui.spacing_mut().item_spacing.x = 2.0;
+                Tab::ALL.into_iter().for_each(|tab| self.tab_ui(tab, ui));
             });
             ui.separator();
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                help_ui(ui);
-                theme_ui(ui);
+                ui.menu_button("Keys", keys_ui);
+                self.theme_ui(ui);
                 ui.separator();
                 self.source_ui(ui);
                 ui.separator();
@@ -153,6 +71,34 @@ impl App {
                 ui.with_layout(name, |ui| self.model_name_ui(ui));
             });
         });
+    }
+
+    /// The button that brings a page to the front; a right click gives it another tile.
+    fn tab_ui(&self, tab: Tab, ui: &mut Ui) {
+        let shown = self.layout.shows(tab);
+        let help = commands::with_keys(ui.ctx(), tab.help(), &format!("tab-{}", tab.key()));
+        let title = RichText::new(tab.title());
+        let title = if shown && tab != self.tab { title.underline() } else { title };
+        let button = ui.selectable_label(tab == self.tab, title).on_hover_text(help);
+        if button.clicked() {
+            self.commands.send(Command::SelectTab(tab));
+        }
+        button.context_menu(|ui| {
+            for side in Side::ALL {
+                if ui.button(format!("{} {}", tab.title(), side.words())).clicked() {
+                    self.commands.send(Command::MoveTab(tab, side));
+                    ui.close();
+                }
+            }
+        });
+    }
+
+    fn theme_ui(&self, ui: &mut Ui) {
+        let dark = ui.visuals().dark_mode;
+        let help = commands::with_keys(ui.ctx(), "Switch between light and dark", "theme");
+        if ui.button(if dark { "Light" } else { "Dark" }).on_hover_text(help).clicked() {
+            self.commands.send(Command::SetDark(!dark));
+        }
     }
 
     fn model_name_ui(&self, ui: &mut Ui) {
@@ -188,13 +134,13 @@ impl App {
         ui.horizontal(|ui| {
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                 self.numbers_ui(ui);
-                let color = if self.status.is_error {
-                    palette(ui.visuals()).error
-                } else {
-                    ui.visuals().text_color()
+                let Some(message) = self.messages.newest() else { return };
+                let color = match message.severity {
+                    Severity::Error => palette(ui.visuals()).error,
+                    Severity::Note => ui.visuals().text_color(),
                 };
                 ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
-                    let text = RichText::new(&self.status.text).small().color(color);
+                    let text = RichText::new(&message.text).small().color(color);
                     ui.add(egui::Label::new(text).truncate());
                 });
             });
@@ -254,7 +200,7 @@ fn take_stop_keys(ui: &Ui) -> bool {
         let mut stop = false;
         input.events.retain(|event| {
             let (taken, pressed) = match event {
-                Event::Key { key: Key::Escape | Key::Space, pressed, .. } => (true, *pressed),
+                Event::Key { key, pressed, .. } if STOP_KEYS.contains(key) => (true, *pressed),
                 Event::Text(text) => (text == " ", text == " "),
                 _ => (false, false),
             };
@@ -263,27 +209,4 @@ fn take_stop_keys(ui: &Ui) -> bool {
         });
         stop
     })
-}
-
-fn theme_ui(ui: &mut Ui) {
-    let name = if ui.visuals().dark_mode { "Light" } else { "Dark" };
-    if ui.button(name).on_hover_text("Switch between light and dark (Ctrl+D)").clicked() {
-        switch_theme(ui);
-    }
-}
-
-fn switch_theme(ui: &Ui) {
-    ui.ctx().set_theme(if ui.visuals().dark_mode { Theme::Light } else { Theme::Dark });
-}
-
-fn help_ui(ui: &mut Ui) {
-    ui.menu_button("Keys", |ui| {
-        egui::Grid::new("keys").num_columns(2).spacing([16.0, 4.0]).show(ui, |ui| {
-            for (keys, meaning) in HELP {
-                ui.label(RichText::new(*keys).monospace());
-                ui.label(*meaning);
-                ui.end_row();
-            }
-        });
-    });
 }

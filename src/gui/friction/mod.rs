@@ -84,6 +84,10 @@ impl FrictionTab {
         self.fit.cancel();
     }
 
+    pub(crate) fn has_log(&self) -> bool {
+        self.loader.log().is_some()
+    }
+
     pub(crate) fn fit_is_running(&self) -> bool {
         self.fit.is_running()
     }

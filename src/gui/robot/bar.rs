@@ -5,9 +5,9 @@ use flqr_core::control::drive::{Stage, StopReason};
 use flqr_core::device::{Connection, SessionOrder};
 
 use super::link::{Link, sentence};
-use crate::app::Tab;
 use crate::command::{Command, Commands, Source};
 use crate::context::ViewContext;
+use crate::tab::Tab;
 use crate::theme::palette;
 use crate::widgets::plain;
 

@@ -12,10 +12,10 @@ use std::path::{Path, PathBuf};
 
 use egui::{CentralPanel, Frame, Margin, Panel, ScrollArea, Ui};
 
-use crate::app::Tab;
 use crate::command::{Command, FilePurpose, Source};
 use crate::context::ViewContext;
 use crate::session::Session;
+use crate::tab::Tab;
 use crate::widgets::hint_ui;
 use live_plots::LivePlots;
 use model::ModelFiles;

@@ -1,0 +1,63 @@
+//! The menus and the list of keys.
+
+use egui::{Button, Grid, RichText, ScrollArea, Ui};
+
+use super::{ALL, GESTURES, Menu, Situation};
+use crate::command::Commands;
+
+/// The menu button with all menus.
+pub(crate) fn menu_ui(situation: &Situation<'_>, commands: &Commands, ui: &mut Ui) {
+    let menu = ui.menu_button("Menu", |ui| {
+        for menu in Menu::ALL {
+            ui.menu_button(menu.title(), |ui| {
+                ScrollArea::vertical()
+                    .max_height(560.0)
+                    .show(ui, |ui| entries_ui(menu, situation, commands, ui));
+            });
+        }
+    });
+    menu.response.on_hover_text("All commands");
+}
+
+fn entries_ui(menu: Menu, situation: &Situation<'_>, commands: &Commands, ui: &mut Ui) {
+    for entry in ALL.iter().filter(|entry| entry.menu == menu) {
+        let sent = entry.send(situation);
+        let button = Button::new(&*entry.name).shortcut_text(entry.keys_text(ui.ctx()));
+        let button = ui.add_enabled(sent.is_ok(), button).accessible_name(entry.accessible_name(&sent));
+        let button = button.on_hover_text(&*entry.help);
+        match sent {
+            Ok(command) if button.clicked() => {
+                commands.send(command);
+                ui.close();
+            }
+            Ok(_) => {}
+            Err(reason) => {
+                button.on_disabled_hover_text(reason);
+            }
+        }
+    }
+}
+
+/// The list of keys.
+pub(crate) fn keys_ui(ui: &mut Ui) {
+    ScrollArea::vertical().max_height(520.0).show(ui, |ui| {
+        Grid::new("keys").num_columns(2).spacing([16.0, 4.0]).show(ui, |ui| {
+            let mut row = |keys: &str, meaning: &str| {
+                ui.label(RichText::new(keys).monospace());
+                ui.label(meaning);
+                ui.end_row();
+            };
+            for (keys, meaning) in GESTURES {
+                row(keys, meaning);
+            }
+        });
+        let with_keys: Vec<_> = ALL.iter().filter(|entry| !entry.keys.is_empty()).collect();
+        Grid::new("command keys").num_columns(2).spacing([16.0, 4.0]).show(ui, |ui| {
+            for entry in with_keys {
+                ui.label(RichText::new(entry.keys_text(ui.ctx())).monospace());
+                ui.label(&*entry.name).on_hover_text(&*entry.help);
+                ui.end_row();
+            }
+        });
+    });
+}

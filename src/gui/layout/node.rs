@@ -1,0 +1,192 @@
+//! A layout as plain data, for files and for undo.
+
+use serde_json::{Value, json};
+
+use crate::tab::Tab;
+
+/// Where a page goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Side {
+    Right,
+    Below,
+    /// Behind the others again.
+    Back,
+}
+
+impl Side {
+    pub(crate) const ALL: [Self; 3] = [Self::Right, Self::Below, Self::Back];
+
+    pub(crate) fn key(self) -> &'static str {
+        match self {
+            Self::Right => "right",
+            Self::Below => "below",
+            Self::Back => "back",
+        }
+    }
+
+    pub(crate) fn words(self) -> &'static str {
+        match self {
+            Self::Right => "to the right",
+            Self::Below => "to the bottom",
+            Self::Back => "back to the others",
+        }
+    }
+}
+
+/// A part of a layout.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Node {
+    /// Pages behind each other.
+    Tabs { tabs: Vec<Tab>, active: Option<Tab> },
+    /// Parts beside or below each other.
+    Split { below: bool, shares: Vec<f32>, children: Vec<Node> },
+}
+
+impl Default for Node {
+    fn default() -> Self {
+        Self::Tabs { tabs: Tab::ALL.to_vec(), active: Some(Tab::default()) }
+    }
+}
+
+impl Node {
+    /// With `tab` in a tile of its own at a side of all others, or behind the first of the others.
+    pub(crate) fn moved(&self, tab: Tab, side: Side) -> Self {
+        let mut seen = vec![tab];
+        let Some(rest) = self.without(&mut seen) else { return self.clone() };
+        let alone = Self::Tabs { tabs: vec![tab], active: Some(tab) };
+        match side {
+            Side::Right | Side::Below => Self::Split {
+                below: side == Side::Below,
+                shares: vec![1.0, 1.0],
+                children: vec![rest, alone],
+            },
+            Side::Back => {
+                let mut rest = rest;
+                rest.first_tabs().insert(0, tab);
+                rest.in_order()
+            }
+        }
+    }
+
+    /// With every page in it once, and nothing empty.
+    pub(crate) fn mended(&self) -> Self {
+        let mut seen = Vec::new();
+        let Some(mut node) = self.without(&mut seen) else { return Self::default() };
+        let missing: Vec<Tab> = Tab::ALL.into_iter().filter(|tab| !seen.contains(tab)).collect();
+        if missing.is_empty() {
+            return node;
+        }
+        node.first_tabs().extend(missing);
+        node.in_order()
+    }
+
+    /// Without the pages in `seen`, which gets those that are left; none where nothing is left.
+    fn without(&self, seen: &mut Vec<Tab>) -> Option<Self> {
+        match self {
+            Self::Tabs { tabs, active } => {
+                let mut kept = Vec::new();
+                for tab in tabs {
+                    if !seen.contains(tab) {
+                        seen.push(*tab);
+                        kept.push(*tab);
+                    }
+                }
+                let active = active.filter(|tab| kept.contains(tab)).or(kept.first().copied());
+                (!kept.is_empty()).then_some(Self::Tabs { tabs: kept, active })
+            }
+            Self::Split { below, shares, children } => {
+                let share = |index: usize| {
+                    shares.get(index).copied().filter(|share| (1e-3..1e3).contains(share)).unwrap_or(1.0)
+                };
+                let kept: Vec<(f32, Self)> = children
+                    .iter()
+                    .enumerate()
+                    .filter_map(|(index, child)| Some((share(index), child.without(seen)?)))
+                    .collect();
+                let (shares, mut children): (Vec<f32>, Vec<Self>) = kept.into_iter().unzip();
+                match children.len() {
+                    0 => None,
+                    1 => children.pop(),
+                    _ => Some(Self::Split { below: *below, shares, children }),
+                }
+            }
+        }
+    }
+
+    fn first_tabs(&mut self) -> &mut Vec<Tab> {
+        match self {
+            Self::Tabs { tabs, .. } => tabs,
+            Self::Split { children, .. } => children[0].first_tabs(),
+        }
+    }
+
+    /// The pages of the first tile in their usual order.
+    fn in_order(mut self) -> Self {
+        self.first_tabs().sort_by_key(|tab| *tab as usize);
+        self
+    }
+
+    /// Whether only the front pages differ.
+    pub(crate) fn is_alike(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Tabs { tabs, .. }, Self::Tabs { tabs: others, .. }) => tabs == others,
+            (
+                Self::Split { below, shares, children },
+                Self::Split { below: other_below, shares: other_shares, children: others },
+            ) => {
+                below == other_below
+                    && shares == other_shares
+                    && children.len() == others.len()
+                    && children.iter().zip(others).all(|(child, other)| child.is_alike(other))
+            }
+            _ => false,
+        }
+    }
+
+    /// For a file.
+    pub(crate) fn to_value(&self) -> Value {
+        match self {
+            Self::Tabs { tabs, active } => json!({
+                "tabs": tabs.iter().map(|tab| tab.key()).collect::<Vec<_>>(),
+                "front": active.map(Tab::key),
+            }),
+            Self::Split { below, shares, children } => json!({
+                "split": if *below { "below" } else { "beside" },
+                "shares": shares,
+                "parts": children.iter().map(Self::to_value).collect::<Vec<_>>(),
+            }),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tabs_of(node: &Node) -> Vec<Tab> {
+        match node {
+            Node::Tabs { tabs, .. } => tabs.clone(),
+            Node::Split { children, .. } => children.iter().flat_map(tabs_of).collect(),
+        }
+    }
+
+    fn has_every_page_once(node: &Node) {
+        let mut tabs = tabs_of(node);
+        tabs.sort_by_key(|tab| *tab as usize);
+        assert_eq!(tabs, Tab::ALL, "{node:?}");
+    }
+
+    #[test]
+    fn a_page_goes_to_a_side_and_back() {
+        let usual = Node::default();
+        let beside = usual.moved(Tab::Robot, Side::Right);
+        let below = beside.moved(Tab::Friction, Side::Below);
+        for node in [&beside, &below] {
+            has_every_page_once(node);
+        }
+        let Node::Split { below: true, children, .. } = &below else { panic!("{below:?}") };
+        assert_eq!(tabs_of(&children[1]), [Tab::Friction]);
+        let back = below.moved(Tab::Friction, Side::Back).moved(Tab::Robot, Side::Back);
+        assert!(back.is_alike(&usual), "{back:?}");
+    }
+}

@@ -1,0 +1,165 @@
+//! Every message since the start: the newest is in the status line, all are on the *Log* page.
+
+use std::collections::VecDeque;
+use std::time::{Duration, Instant};
+
+use egui::{CentralPanel, Frame, Margin, RichText, ScrollArea, TextEdit, Ui};
+
+use crate::theme::palette;
+use crate::widgets::hint_ui;
+
+/// The oldest go first.
+const LONGEST: usize = 2000;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Severity {
+    Note,
+    Error,
+}
+
+impl Severity {
+    fn word(self) -> &'static str {
+        match self {
+            Self::Note => "note",
+            Self::Error => "error",
+        }
+    }
+}
+
+/// One message, and how often it came in a row.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Message {
+    /// Since the start.
+    pub(crate) time: Duration,
+    pub(crate) severity: Severity,
+    pub(crate) text: String,
+    pub(crate) times: usize,
+}
+
+impl Message {
+    fn line(&self) -> String {
+        let times = if self.times > 1 { format!(" ({} times)", self.times) } else { String::new() };
+        format!("{:9.3} s  {:5}  {}{times}", self.time.as_secs_f64(), self.severity.word(), self.text)
+    }
+}
+
+/// All messages, and what the page shows of them.
+pub(crate) struct Messages {
+    start: Instant,
+    all: VecDeque<Message>,
+    filter: String,
+    only_errors: bool,
+}
+
+impl Default for Messages {
+    fn default() -> Self {
+        Self { start: Instant::now(), all: VecDeque::new(), filter: String::new(), only_errors: false }
+    }
+}
+
+impl Messages {
+    pub(crate) fn add(&mut self, severity: Severity, text: impl Into<String>) {
+        let (time, text) = (self.start.elapsed(), text.into());
+        match self.all.back_mut() {
+            Some(last) if last.text == text && last.severity == severity => {
+                last.time = time;
+                last.times += 1;
+            }
+            _ => {
+                if self.all.len() == LONGEST {
+                    self.all.pop_front();
+                }
+                self.all.push_back(Message { time, severity, text, times: 1 });
+            }
+        }
+    }
+
+    /// What the status line says.
+    pub(crate) fn newest(&self) -> Option<&Message> {
+        self.all.back()
+    }
+
+    fn shown(&self) -> Vec<&Message> {
+        let filter = self.filter.trim().to_lowercase();
+        let fits = |message: &&Message| {
+            (!self.only_errors || message.severity == Severity::Error)
+                && (filter.is_empty() || message.text.to_lowercase().contains(&filter))
+        };
+        self.all.iter().filter(fits).collect()
+    }
+
+    /// The page.
+    pub(crate) fn ui(&mut self, ui: &mut Ui) {
+        let frame = Frame::central_panel(ui.style()).inner_margin(Margin::symmetric(10, 6));
+        CentralPanel::default().frame(frame).show(ui, |ui| {
+            self.controls_ui(ui);
+            ui.separator();
+            self.rows_ui(ui);
+        });
+    }
+
+    fn controls_ui(&mut self, ui: &mut Ui) {
+        ui.horizontal_wrapped(|ui| {
+            let filter = TextEdit::singleline(&mut self.filter).hint_text("filter").desired_width(180.0);
+            ui.add(filter).accessible_name("message filter").on_hover_text("Messages with these letters");
+            ui.checkbox(&mut self.only_errors, "Errors only");
+            let shown = self.shown();
+            let copy = ui.add_enabled(!shown.is_empty(), egui::Button::new("Copy messages"));
+            if copy.on_hover_text("Copy what is shown, as text").clicked() {
+                let lines: Vec<_> = shown.iter().map(|message| message.line()).collect();
+                ui.ctx().copy_text(lines.join("\n"));
+            }
+            hint_ui(ui, format!("{} of {} messages", shown.len(), self.all.len()));
+            if ui.button("Clear").on_hover_text("Forget all messages").clicked() {
+                self.all.clear();
+            }
+        });
+    }
+
+    fn rows_ui(&self, ui: &mut Ui) {
+        let shown = self.shown();
+        if shown.is_empty() {
+            hint_ui(ui, "No message.");
+            return;
+        }
+        let color = palette(ui.visuals()).error;
+        ScrollArea::vertical().auto_shrink(false).stick_to_bottom(true).show(ui, |ui| {
+            for message in shown {
+                ui.horizontal_top(|ui| {
+                    let time = format!("{:9.3} s", message.time.as_secs_f64());
+                    ui.label(RichText::new(time).monospace().weak()).on_hover_text("Time since the start");
+                    let text = match (message.severity, message.times) {
+                        (_, 1) => message.text.clone(),
+                        (_, times) => format!("{} ({times} times)", message.text),
+                    };
+                    let text = RichText::new(text);
+                    let text = if message.severity == Severity::Error { text.color(color) } else { text };
+                    ui.add(egui::Label::new(text).wrap().selectable(true));
+                });
+            }
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn repeated_messages_are_counted_and_old_ones_go() {
+        let mut messages = Messages::default();
+        for _ in 0..3 {
+            messages.add(Severity::Error, "no");
+        }
+        messages.add(Severity::Note, "no");
+        assert_eq!(messages.all.iter().map(|m| m.times).collect::<Vec<_>>(), [3, 1]);
+        for number in 0..3 * LONGEST {
+            messages.add(Severity::Note, number.to_string());
+        }
+        assert_eq!(messages.all.len(), LONGEST);
+        assert_eq!(messages.newest().map(|m| m.text.as_str()), Some("5999"));
+        messages.filter = "599".to_owned();
+        // 4599, 5599 and 5990 to 5999: the 599th is gone.
+        assert_eq!(messages.shown().len(), 12);
+    }
+}

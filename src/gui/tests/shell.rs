@@ -1,0 +1,140 @@
+//! What is around the pages: commands, palette, tiles, messages.
+
+#![expect(clippy::unwrap_used, reason = "helpers of tests, where a panic is the report")]
+
+mod common;
+
+use common::{SIZE, Window, click, open, options, state};
+use egui::{Event, Key, Modifiers};
+use egui_kittest::kittest::Queryable;
+use flqr_gui::{Tab, WindowOptions};
+use serde_json::json;
+
+/// Finds a command by its name, as a person would, and takes the first.
+fn command(window: &mut Window, name: &str) {
+    window.key_press_modifiers(Modifiers::COMMAND, Key::K);
+    window.run_steps(3);
+    window.event(Event::Text(name.to_owned()));
+    window.run_steps(2);
+    window.key_press(Key::Enter);
+    window.run_steps(4);
+}
+
+fn message(window: &Window) -> String {
+    state(window)["message"].as_str().unwrap().to_owned()
+}
+
+#[test]
+fn the_palette_filters_moves_takes_and_closes() {
+    let mut window = open(options(Tab::Tune), SIZE);
+    command(&mut window, "Experiments");
+    assert_eq!(state(&window)["tab"], "experiments");
+    assert!(window.query_by_label("command").is_none(), "it closes by itself");
+    command(&mut window, "use lqr");
+    assert_eq!(state(&window)["controller"], "lqr");
+
+    window.key_press_modifiers(Modifiers::COMMAND, Key::K);
+    window.run_steps(3);
+    window.event(Event::Text("size".to_owned()));
+    window.step();
+    window.key_press(Key::Escape);
+    window.run_steps(3);
+    assert!(window.query_by_label("command").is_none(), "Esc closes it");
+    assert_eq!(state(&window)["tab"], "experiments");
+
+    window.key_press_modifiers(Modifiers::COMMAND, Key::K);
+    window.run_steps(3);
+    let first = ["Open…", "Open a model…", "Open a log…"].map(|name| window.query_by_label(name).is_some());
+    assert_eq!(first, [true; 3], "all commands, in the order of the menus");
+    window.event(Event::Text("source:".to_owned()));
+    window.step();
+    for key in [Key::ArrowDown, Key::ArrowDown, Key::ArrowUp, Key::Enter] {
+        window.key_press(key);
+        window.run_steps(2);
+    }
+    assert_eq!(state(&window)["source"], "emulated", "the second of the sources");
+}
+
+#[test]
+fn a_command_that_cannot_be_given_says_why() {
+    let mut window = open(options(Tab::Tune), SIZE);
+    command(&mut window, "start or cancel the fit");
+    window.get_by_label("Start or cancel the fit: there is no log");
+    window.key_press(Key::Escape);
+    window.run_steps(2);
+    window.key_press_modifiers(Modifiers::COMMAND, Key::Enter);
+    window.run_steps(3);
+    assert_eq!(message(&window), "Start or cancel: this page starts nothing.");
+}
+
+#[test]
+fn pages_are_shown_beside_each_other_and_put_back() {
+    let mut window = open(WindowOptions { paused: false, ..options(Tab::Tune) }, SIZE);
+    assert_eq!(state(&window)["shown"], json!(["tune"]));
+    command(&mut window, "Friction to the right");
+    assert_eq!(state(&window)["shown"], json!(["tune", "friction"]));
+    assert_eq!(state(&window)["tab"], "friction", "it is the page that keys are about");
+    window.get_by_label("pitch weight slider");
+    window.get_by_label("log path");
+    command(&mut window, "Experiments to the bottom");
+    let shown = state(&window);
+    assert_eq!(shown["shown"].as_array().map(Vec::len), Some(3), "{shown:#}");
+
+    // A press in a tile turns keys to its page.
+    window.get_by_label("displacement").click();
+    window.run_steps(2);
+    assert_eq!(state(&window)["tab"], "tune");
+    command(&mut window, "Robot");
+    let shown = &state(&window)["shown"];
+    assert!(!shown.as_array().unwrap().contains(&"tune".into()), "Robot is in front of it: {shown}");
+
+    command(&mut window, "reset the layout");
+    assert_eq!(state(&window)["shown"], json!(["robot"]));
+    command(&mut window, "reset the layout");
+    window.get_by_label("Reset the layout: it is as at the first start");
+}
+
+#[test]
+fn messages_are_kept_filtered_and_copied() {
+    let mut window = open(options(Tab::Tune), SIZE);
+    click(&mut window, "Log");
+    let shown = window.get_all_by_label_contains("is loaded.").count();
+    assert_eq!(shown, 2, "in the list and in the status line");
+    window.key_press_modifiers(Modifiers::COMMAND, Key::Enter);
+    window.run_steps(3);
+    window.get_by_label("2 of 2 messages");
+    window.get_by_label("message filter").click();
+    window.step();
+    window.event(Event::Text("starts".to_owned()));
+    window.run_steps(3);
+    window.get_by_label("1 of 2 messages");
+    click(&mut window, "Copy messages");
+    click(&mut window, "Clear");
+    window.get_by_label("No message.");
+}
+
+#[test]
+fn theme_and_size_are_commands_too() {
+    let mut window = open(options(Tab::Tune), SIZE);
+    let dark = window.ctx.global_style().visuals.dark_mode;
+    window.key_press_modifiers(Modifiers::COMMAND, Key::D);
+    window.run_steps(2);
+    assert_ne!(window.ctx.global_style().visuals.dark_mode, dark);
+    for (key, zoom) in [(Key::Plus, 1.1), (Key::Minus, 1.0), (Key::Minus, 1.0 / 1.1), (Key::Num0, 1.0)] {
+        window.key_press_modifiers(Modifiers::COMMAND, key);
+        window.run_steps(3);
+        assert!((window.ctx.zoom_factor() - zoom).abs() < 1e-5, "{key:?}: {}", window.ctx.zoom_factor());
+    }
+}
+
+#[test]
+fn the_menus_and_the_list_of_keys_are_made_of_the_commands() {
+    let mut window = open(options(Tab::Tune), SIZE);
+    click(&mut window, "Menu");
+    window.get_by_label("View").click();
+    window.run_steps(4);
+    click(&mut window, "Friction to the right");
+    assert_eq!(state(&window)["shown"], json!(["tune", "friction"]));
+    click(&mut window, "Keys");
+    window.get_by_label("STOP a robot that is checked or driven: no torque, motors off");
+}
