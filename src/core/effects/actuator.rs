@@ -4,11 +4,13 @@
 
 use std::collections::VecDeque;
 
-use super::kind::{EffectKind, Feedforward, Parameter, Place, undeclared};
+use super::kind::{EffectKind, Feedforward, Grid, Parameter, Place, Step, Trial, undeclared};
 use super::law::{Action, Moment, Term};
 use super::machine::MachineKind;
 
 const EVERYWHERE: &[MachineKind] = &[MachineKind::Robot, MachineKind::Rotary, MachineKind::Linear];
+/// Delays and time constants that are tried, s.
+const TIMES: Grid = Grid::Values(&[1e-3, 1.8e-3, 3.2e-3, 5e-3, 7.5e-3, 11e-3, 16e-3]);
 
 /// Bus, queue and firmware.
 pub(super) static COMMAND_DELAY: EffectKind = EffectKind {
@@ -16,8 +18,11 @@ pub(super) static COMMAND_DELAY: EffectKind = EffectKind {
     summary: "the torque acts a fixed time after it is asked for",
     place: Place::Actuator,
     machines: EVERYWHERE,
-    parameters: &[Parameter::shape("delay_s", [0.0, 0.5], "time from asking to acting")],
+    parameters: &[Parameter::shape("delay_s", [0.0, 0.5], "time from asking to acting")
+        .sized()
+        .tried(TIMES, Step::Factor(1.3))],
     series: false,
+    trial: Trial::PLAIN,
     make_terms: |_, shape| {
         let mut line = DelayLine::new(shape[0]);
         vec![Term::fixed(move |m: &Moment| Action::motor(line.delayed(m.torque_nm, m.dt_s) - m.torque_nm))]
@@ -33,8 +38,11 @@ pub(super) static ACTUATOR_LAG: EffectKind = EffectKind {
     summary: "the torque follows the one that is asked for with a first-order lag",
     place: Place::Actuator,
     machines: EVERYWHERE,
-    parameters: &[Parameter::shape("time_constant_s", [1e-5, 1.0], "time to 63 % of a step")],
+    parameters: &[Parameter::shape("time_constant_s", [1e-5, 1.0], "time to 63 % of a step")
+        .sized()
+        .tried(TIMES, Step::Factor(1.3))],
     series: false,
+    trial: Trial::PLAIN,
     make_terms: |_, shape| {
         let mut lag = Lag::new(shape[0]);
         vec![Term::fixed(move |m: &Moment| Action::motor(lag.mean(m.torque_nm, m.dt_s) - m.torque_nm))]
@@ -52,6 +60,7 @@ pub(super) static TORQUE_GAIN: EffectKind = EffectKind {
     machines: EVERYWHERE,
     parameters: &[Parameter::amplitude("gain", [-0.9, 10.0], "share of the torque that is added to it")],
     series: false,
+    trial: Trial::PLAIN,
     make_terms: |_, _| vec![Term::new("gain", |m: &Moment| Action::motor(m.torque_nm))],
     separated_by: "a known payload, or a known weight on a lever",
     feedforward: Feedforward::Causal,
@@ -64,10 +73,11 @@ pub(super) static TORQUE_SATURATION: EffectKind = EffectKind {
     summary: "the torque is cut at a limit",
     place: Place::Actuator,
     machines: EVERYWHERE,
-    parameters: &[
-        Parameter::shape("limit_nm", [1e-4, 1000.0], "largest torque").linear("limit_n", [1e-3, 1e6])
-    ],
+    parameters: &[Parameter::shape("limit_nm", [1e-4, 1000.0], "largest torque")
+        .linear("limit_n", [1e-3, 1e6])
+        .tried(Grid::OfTorque(&[0.5, 0.6, 0.7, 0.8, 0.9]), Step::Factor(1.08))],
     series: false,
+    trial: Trial::PLAIN,
     make_terms: |_, shape| {
         let limit = shape[0];
         let cut = move |torque: f64| torque.clamp(-limit, limit);
@@ -85,8 +95,10 @@ pub(super) static TORQUE_DEADZONE: EffectKind = EffectKind {
     place: Place::Actuator,
     machines: EVERYWHERE,
     parameters: &[Parameter::shape("width_nm", [0.0, 10.0], "torque up to which nothing acts")
-        .linear("width_n", [0.0, 1e4])],
+        .linear("width_n", [0.0, 1e4])
+        .tried(Grid::Values(&[0.01, 0.02, 0.04, 0.08]), Step::Factor(1.4))],
     series: false,
+    trial: Trial::cautious(1.6),
     make_terms: |_, shape| {
         let width = shape[0];
         vec![Term::fixed(move |m: &Moment| Action::motor(-m.torque_nm.clamp(-width, width)))]
@@ -105,11 +117,15 @@ pub(super) static BACKLASH: EffectKind = EffectKind {
     place: Place::Actuator,
     machines: EVERYWHERE,
     parameters: &[
-        Parameter::shape("gap_rad", [0.0, 0.5], "angle of the gap").linear("gap_m", [0.0, 0.05]),
+        Parameter::shape("gap_rad", [0.0, 0.5], "angle of the gap")
+            .linear("gap_m", [0.0, 0.05])
+            .tried(Grid::Values(&[0.005, 0.02, 0.06]), Step::Factor(1.6)),
         Parameter::shape("rotor_inertia_kg_m2", [1e-8, 10.0], "inertia on the motor's side of the gap")
-            .linear("rotor_mass_kg", [1e-4, 1e3]),
+            .linear("rotor_mass_kg", [1e-4, 1e3])
+            .tried(Grid::OfWheelInertia(0.2), Step::Fixed),
     ],
     series: false,
+    trial: Trial::cautious(1.6),
     make_terms: |_, shape| {
         let mut gap = Gap { width: shape[0], inertia: shape[1], place: None, speed: 0.0 };
         vec![Term::fixed(move |m: &Moment| {

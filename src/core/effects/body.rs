@@ -2,7 +2,9 @@
 
 use std::f64::consts::TAU;
 
-use super::kind::{EffectKind, Feedforward, NOT_INSIDE, Parameter, Place, undeclared};
+use super::kind::{
+    EffectKind, Feedforward, Form, Grid, NOT_INSIDE, Parameter, Place, Step, Trial, undeclared,
+};
 use super::law::{Action, Moment, Term};
 use super::machine::MachineKind;
 
@@ -16,6 +18,7 @@ pub(super) static PITCH_OFFSET: EffectKind = EffectKind {
     machines: ROBOT,
     parameters: &[Parameter::amplitude("angle_rad", [-0.5, 0.5], "angle by which it is in front")],
     series: false,
+    trial: Trial::PLAIN,
     make_terms: |machine, _| {
         let p = machine.parameters;
         let weight_nm = p.body_mass_kg * p.gravity_m_s2 * p.com_height_m;
@@ -33,11 +36,14 @@ pub(super) static STRUCTURAL_MODE: EffectKind = EffectKind {
     place: Place::Pitch,
     machines: &[MachineKind::Robot, MachineKind::Rotary, MachineKind::Linear],
     parameters: &[
-        Parameter::shape("frequency_hz", [0.5, 500.0], "its resonance"),
-        Parameter::shape("damping_ratio", [1e-3, 0.99], "its damping as a share of the critical one"),
-        Parameter::amplitude("share", [-2.0, 2.0], "share of the torque that it takes"),
+        Parameter::shape("frequency_hz", [0.5, 500.0], "its resonance")
+            .tried(Grid::Geometric(2.5, 1.14, 14), Step::Factor(1.07)),
+        Parameter::shape("damping_ratio", [1e-3, 0.99], "its damping as a share of the critical one")
+            .tried(Grid::Values(&[0.04]), Step::Factor(1.6)),
+        Parameter::amplitude("share", [-2.0, 2.0], "share of the torque that it takes").opposing(),
     ],
     series: false,
+    trial: Trial { repeats: true, forms: &[Form::Law, Form::Driven], ..Trial::cautious(6.0) },
     make_terms: |machine, shape| {
         let mut mode = Oscillator::new(shape[0], shape[1]);
         let on_robot = machine.kind == MachineKind::Robot;
@@ -62,12 +68,17 @@ pub(super) static SLOSH: EffectKind = EffectKind {
     place: Place::Translation,
     machines: ROBOT,
     parameters: &[
-        Parameter::shape("frequency_hz", [0.1, 50.0], "its resonance"),
-        Parameter::shape("damping_ratio", [1e-3, 0.99], "its damping as a share of the critical one"),
-        Parameter::shape("height_m", [-1.0, 3.0], "its height above the axle along the body").or(0.0),
+        Parameter::shape("frequency_hz", [0.1, 50.0], "its resonance")
+            .tried(Grid::Geometric(0.5, 1.16, 14), Step::Factor(1.08)),
+        Parameter::shape("damping_ratio", [1e-3, 0.99], "its damping as a share of the critical one")
+            .tried(Grid::Values(&[0.05]), Step::Factor(1.6)),
+        Parameter::shape("height_m", [-1.0, 3.0], "its height above the axle along the body")
+            .or(0.0)
+            .tried(Grid::OfHeight(&[1.0]), Step::OfHeight(0.3)),
         Parameter::amplitude("mass_kg", [0.0, 100.0], "how much of the declared mass moves"),
     ],
     series: false,
+    trial: Trial::PLAIN,
     make_terms: |machine, shape| {
         let mut mass = Oscillator::new(shape[0], shape[1]);
         let (stiffness, height_m, gravity) =

@@ -1,7 +1,7 @@
 //! Friction beside the declared curve.
 
 use super::effect::Effect;
-use super::kind::{Declared, EffectKind, Feedforward, Parameter, Place, undeclared};
+use super::kind::{Declared, EffectKind, Feedforward, Form, Grid, Parameter, Place, Step, Trial, undeclared};
 use super::law::{Action, Moment, Term};
 use super::machine::MachineKind;
 use crate::friction::{Stribeck, StribeckParameters};
@@ -17,8 +17,10 @@ pub(super) static QUADRATIC_DRAG: EffectKind = EffectKind {
     place: Place::Motor,
     machines: EVERYWHERE,
     parameters: &[Parameter::amplitude("drag_nm_s2_rad2", [-1.0, 1.0], "torque at 1 rad/s")
-        .linear("drag_n_s2_m2", [-1e5, 1e5])],
+        .linear("drag_n_s2_m2", [-1e5, 1e5])
+        .opposing()],
     series: false,
+    trial: Trial::PLAIN,
     make_terms: |machine, _| {
         vec![Term::new(QUADRATIC_DRAG.parameters[0].key(machine.kind), |m: &Moment| {
             Action::motor(-m.motor_speed_rad_s * m.motor_speed_rad_s.abs())
@@ -42,6 +44,7 @@ pub(super) static VISCOUS_ASYMMETRY: EffectKind = EffectKind {
     )
     .linear("viscous_n_s_m", [-1e5, 1e5])],
     series: false,
+    trial: Trial { forms: &[Form::Law, Form::Forward(&VISCOUS_ERROR)], ..Trial::PLAIN },
     make_terms: |machine, _| {
         vec![Term::new(VISCOUS_ASYMMETRY.parameters[0].key(machine.kind), |m: &Moment| {
             Action::motor(-m.motor_speed_rad_s.abs())
@@ -65,6 +68,7 @@ pub(super) static FRICTION_ASYMMETRY: EffectKind = EffectKind {
     )
     .linear("coulomb_n", [-1e4, 1e4])],
     series: false,
+    trial: Trial { forms: &[Form::Law, Form::Forward(&COULOMB_ERROR)], ..Trial::PLAIN },
     make_terms: |machine, _| {
         vec![Term::new(FRICTION_ASYMMETRY.parameters[0].key(machine.kind), |_: &Moment| Action::motor(-1.0))]
     },
@@ -81,10 +85,12 @@ pub(super) static LOW_SPEED_FRICTION: EffectKind = EffectKind {
     machines: EVERYWHERE,
     parameters: &[
         Parameter::shape("speed_rad_s", [1e-3, 100.0], "speed over which it fades")
-            .linear("speed_m_s", [1e-5, 10.0]),
+            .linear("speed_m_s", [1e-5, 10.0])
+            .tried(Grid::Values(&[0.3, 0.7, 1.5]), Step::Factor(1.5)),
         Parameter::amplitude("level_nm", [-5.0, 5.0], "level at rest").linear("level_n", [-1e4, 1e4]),
     ],
     series: false,
+    trial: Trial::cautious(1.6),
     make_terms: |machine, shape| {
         let scale = shape[0];
         vec![Term::new(LOW_SPEED_FRICTION.parameters[1].key(machine.kind), move |m: &Moment| {
@@ -108,6 +114,7 @@ pub(super) static LOAD_DEPENDENT_FRICTION: EffectKind = EffectKind {
         "level as a share of the torque's magnitude",
     )],
     series: false,
+    trial: Trial::PLAIN,
     make_terms: |_, _| vec![Term::new("coefficient", |m: &Moment| Action::friction(m.torque_nm.abs()))],
     separated_by: "several loads at one speed",
     feedforward: Feedforward::Causal,
@@ -121,11 +128,13 @@ pub(super) static THERMAL_FRICTION: EffectKind = EffectKind {
     place: Place::Motor,
     machines: EVERYWHERE,
     parameters: &[
-        Parameter::shape("time_constant_s", [1.0, 1e5], "time in which 63 % of it are gone"),
+        Parameter::shape("time_constant_s", [1.0, 1e5], "time in which 63 % of it are gone")
+            .tried(Grid::OfLog(&[0.1, 0.25, 0.6]), Step::Factor(1.5)),
         Parameter::amplitude("fall_nm", [-5.0, 5.0], "by how much the level falls in the end")
             .linear("fall_n", [-1e4, 1e4]),
     ],
     series: false,
+    trial: Trial::PLAIN,
     make_terms: |machine, shape| {
         let time_constant_s = shape[0];
         vec![Term::new(THERMAL_FRICTION.parameters[1].key(machine.kind), move |m: &Moment| {
@@ -145,11 +154,13 @@ pub(super) static PRESLIDING: EffectKind = EffectKind {
     machines: EVERYWHERE,
     parameters: &[
         Parameter::shape("way_rad", [1e-6, 1.0], "way over which 63 % of it build up")
-            .linear("way_m", [1e-7, 0.1]),
+            .linear("way_m", [1e-7, 0.1])
+            .tried(Grid::Values(&[0.01, 0.03, 0.1, 0.2]), Step::Factor(1.6)),
         Parameter::amplitude("level_nm", [0.0, 5.0], "level that builds up, part of the declared one")
             .linear("level_n", [0.0, 1e4]),
     ],
     series: false,
+    trial: Trial::cautious(1.6),
     make_terms: |machine, shape| {
         let way = shape[0];
         let (mut bend, mut before) = (0.0_f64, None);
@@ -181,6 +192,7 @@ pub(super) static COULOMB_ERROR: EffectKind = EffectKind {
     )
     .linear("coulomb_n", [-1e4, 1e4])],
     series: false,
+    trial: Trial::PLAIN,
     make_terms: |machine, _| {
         vec![Term::new(COULOMB_ERROR.parameters[0].key(machine.kind), |_: &Moment| Action::friction(1.0))]
     },
@@ -204,6 +216,7 @@ pub(super) static VISCOUS_ERROR: EffectKind = EffectKind {
     parameters: &[Parameter::amplitude("viscous_nm_s_rad", [-10.0, 10.0], "what is added to it")
         .linear("viscous_n_s_m", [-1e5, 1e5])],
     series: false,
+    trial: Trial::PLAIN,
     make_terms: |machine, _| {
         vec![Term::new(VISCOUS_ERROR.parameters[0].key(machine.kind), |m: &Moment| {
             Action::motor(-m.motor_speed_rad_s)

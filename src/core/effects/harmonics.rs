@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::kind::{EffectKind, Feedforward, Parameter, Place, undeclared};
+use super::kind::{EffectKind, Feedforward, Grid, Parameter, Place, Step, Trial, undeclared};
 use super::law::{Action, Moment, Term};
 use super::machine::{Machine, MachineKind};
 
@@ -10,6 +10,10 @@ use super::machine::{Machine, MachineKind};
 const ORDER: Parameter = Parameter::shape("order_#", [1.0, 20_000.0], "cycles per turn")
     .whole()
     .linear("period_#_m", [1e-5, 10.0]);
+/// Orders that are tried.
+const fn orders(most: u32) -> Parameter {
+    ORDER.tried(Grid::Orders(most), Step::Fixed)
+}
 
 /// Torque that depends on the rotor's angle: magnets that prefer some of the stator's teeth, errors of the current's
 /// phase at a constant current, a joint that runs unevenly.
@@ -19,11 +23,12 @@ pub(super) static COGGING: EffectKind = EffectKind {
     place: Place::Motor,
     machines: &[MachineKind::Robot, MachineKind::Rotary, MachineKind::Linear],
     parameters: &[
-        ORDER,
+        orders(60),
         Parameter::amplitude("cos_#_nm", [-20.0, 20.0], "cosine part").linear("cos_#_n", [-1e4, 1e4]),
         Parameter::amplitude("sin_#_nm", [-20.0, 20.0], "sine part").linear("sin_#_n", [-1e4, 1e4]),
     ],
     series: true,
+    trial: Trial::PLAIN,
     make_terms: |machine, shape| {
         harmonics(machine, shape, ["cos_#_nm", "sin_#_nm"], ["cos_#_n", "sin_#_n"], |wave, _| {
             Action::motor(wave)
@@ -41,11 +46,12 @@ pub(super) static TORQUE_RIPPLE: EffectKind = EffectKind {
     place: Place::Motor,
     machines: &[MachineKind::Robot, MachineKind::Rotary, MachineKind::Linear],
     parameters: &[
-        ORDER,
+        orders(40),
         Parameter::amplitude("cos_#", [-1.0, 1.0], "cosine part as a share of the torque"),
         Parameter::amplitude("sin_#", [-1.0, 1.0], "sine part as a share of the torque"),
     ],
     series: true,
+    trial: Trial::PLAIN,
     make_terms: |machine, shape| {
         let keys = ["cos_#", "sin_#"];
         harmonics(machine, shape, keys, keys, |wave, moment| Action::motor(wave * moment.torque_nm))
@@ -62,11 +68,12 @@ pub(super) static POSITION_DEPENDENT_FRICTION: EffectKind = EffectKind {
     place: Place::Motor,
     machines: &[MachineKind::Robot, MachineKind::Rotary, MachineKind::Linear],
     parameters: &[
-        ORDER,
+        orders(10),
         Parameter::amplitude("cos_#_nm", [-5.0, 5.0], "cosine part").linear("cos_#_n", [-1e4, 1e4]),
         Parameter::amplitude("sin_#_nm", [-5.0, 5.0], "sine part").linear("sin_#_n", [-1e4, 1e4]),
     ],
     series: true,
+    trial: Trial::PLAIN,
     make_terms: |machine, shape| {
         let action = |wave, _: &Moment| Action::friction(wave);
         harmonics(machine, shape, ["cos_#_nm", "sin_#_nm"], ["cos_#_n", "sin_#_n"], action)

@@ -60,6 +60,89 @@ pub struct Parameter {
     pub default: Option<f64>,
     /// Whether it is a whole number on a robot and on a rotary axis.
     pub whole: bool,
+    /// Whether it is against the motion, or pulls back: such an amplitude is not below 0.
+    pub opposing: bool,
+    /// Whether the effect is nearly in proportion to it, though it is a shape.
+    pub sized: bool,
+    /// Where a search for the effect begins, and how it goes on from there.
+    pub grid: Grid,
+    /// See `grid`.
+    pub step: Step,
+}
+
+/// Values of a shape parameter at which a search begins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Grid {
+    /// Its default; nowhere without one.
+    Default,
+    /// Whole numbers from 1 up to this one, as far as they can be told at the speeds of a log.
+    Orders(u32),
+    /// These.
+    Values(&'static [f64]),
+    /// From this one by this factor, so many.
+    Geometric(f64, f64, u32),
+    /// Shares of the length of the log.
+    OfLog(&'static [f64]),
+    /// Shares of the largest torque in the log.
+    OfTorque(&'static [f64]),
+    /// Shares of the height of the centre of mass.
+    OfHeight(&'static [f64]),
+    /// A share of the inertia of a wheel.
+    OfWheelInertia(f64),
+    /// Places along the way, as far apart as the next parameter says.
+    Way,
+}
+
+/// How a search refines a shape parameter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Step {
+    /// Not.
+    Fixed,
+    /// By a factor.
+    Factor(f64),
+    /// By a sum.
+    Sum(f64),
+    /// By a share of the height of the centre of mass.
+    OfHeight(f64),
+    /// By a share of the next parameter.
+    OfNext(f64),
+}
+
+/// How an effect enters the equations of a robot, where there is more than one way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// As its law says.
+    Law,
+    /// Only where the motors turn forward: half of it, and half of the error of the same in both directions.
+    Forward(&'static EffectKind),
+    /// A mode of the body that its own turning drives.
+    Driven,
+    /// Waves of the ground, a row of bumps: their length is the second shape parameter.
+    Wave,
+    /// The log read with an IMU that speaks late.
+    Late,
+}
+
+/// How a search over logs goes about an effect.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Trial {
+    /// Evidence that it needs, in units of what a plain effect does: what else is easily taken for it.
+    pub caution: f64,
+    /// Whether a machine can have several, each of a shape of its own; those of a series can anyway.
+    pub repeats: bool,
+    /// Whether it is there for a moment only, of which no other part of a log tells.
+    pub brief: bool,
+    /// Ways to enter.
+    pub forms: &'static [Form],
+}
+
+impl Trial {
+    /// Of an effect without anything special.
+    pub(super) const PLAIN: Self = Self { caution: 1.0, repeats: false, brief: false, forms: &[Form::Law] };
+    /// Of one that noise and what is next to it easily look like.
+    pub(super) const fn cautious(caution: f64) -> Self {
+        Self { caution, ..Self::PLAIN }
+    }
 }
 
 impl Parameter {
@@ -74,6 +157,10 @@ impl Parameter {
             linear_range: range,
             default: None,
             whole: false,
+            opposing: false,
+            sized: false,
+            grid: Grid::Default,
+            step: Step::Fixed,
         }
     }
 
@@ -90,6 +177,21 @@ impl Parameter {
     /// May be left out.
     pub(super) const fn or(self, default: f64) -> Self {
         Self { default: Some(default), ..self }
+    }
+
+    /// Is not below 0 in a search.
+    pub(super) const fn opposing(self) -> Self {
+        Self { opposing: true, ..self }
+    }
+
+    /// Is nearly in proportion to the effect.
+    pub(super) const fn sized(self) -> Self {
+        Self { sized: true, ..self }
+    }
+
+    /// Is searched for from these values on.
+    pub(super) const fn tried(self, grid: Grid, step: Step) -> Self {
+        Self { grid, step, ..self }
     }
 
     /// Is a whole number.
@@ -161,6 +263,8 @@ pub struct EffectKind {
     pub parameters: &'static [Parameter],
     /// Whether the parameters repeat, numbered from 1, as harmonics do.
     pub series: bool,
+    /// How a search goes about it.
+    pub trial: Trial,
     /// Its terms on a machine at shape parameters, which stand in the order of the parameters.
     pub(super) make_terms: fn(&Machine, &[f64]) -> Vec<Term>,
     /// The experiment that tells it from the others that look alike.
@@ -234,3 +338,5 @@ impl PartialEq for EffectKind {
         self.id == other.id
     }
 }
+
+impl Eq for EffectKind {}

@@ -24,7 +24,7 @@ mod surroundings;
 pub use acting::RobotLaws;
 pub use effect::{Effect, EffectError, EffectLaw};
 pub use feedforward::EffectFeedforward;
-pub use kind::{Declared, EffectKind, Feedforward, Parameter, Place, Role, unit_of};
+pub use kind::{Declared, EffectKind, Feedforward, Form, Grid, Parameter, Place, Role, Step, Trial, unit_of};
 pub use law::{Action, Law, Moment, Term};
 pub use machine::{Machine, MachineKind};
 

@@ -1,7 +1,7 @@
 //! Declared numbers of the body and the wheels that are off.
 
 use super::effect::Effect;
-use super::kind::{Declared, EffectKind, Feedforward, Parameter, Place};
+use super::kind::{Declared, EffectKind, Feedforward, Parameter, Place, Trial};
 use super::law::{Action, Moment, Term};
 use super::machine::MachineKind;
 use crate::model_file::{AxisModel, AxisParameters};
@@ -17,6 +17,7 @@ pub(super) static MASS_ERROR: EffectKind = EffectKind {
     machines: ROBOT,
     parameters: &[Parameter::amplitude("mass_kg", [-100.0, 100.0], "what is added to it")],
     series: false,
+    trial: Trial::PLAIN,
     make_terms: |machine, _| {
         let (height, gravity) = (machine.parameters.com_height_m, machine.parameters.gravity_m_s2);
         vec![Term::new("mass_kg", move |m: &Moment| {
@@ -45,6 +46,7 @@ pub(super) static COM_HEIGHT_ERROR: EffectKind = EffectKind {
     machines: ROBOT,
     parameters: &[Parameter::amplitude("height_m", [-3.0, 3.0], "what is added to it, to first order")],
     series: false,
+    trial: Trial::PLAIN,
     make_terms: |machine, _| {
         let RobotParameters { body_mass_kg: mass, com_height_m: height, gravity_m_s2: gravity, .. } =
             machine.parameters;
@@ -74,6 +76,7 @@ pub(super) static BODY_INERTIA_ERROR: EffectKind = EffectKind {
     machines: ROBOT,
     parameters: &[Parameter::amplitude("inertia_kg_m2", [-100.0, 100.0], "what is added to it")],
     series: false,
+    trial: Trial::PLAIN,
     make_terms: |_, _| vec![Term::new("inertia_kg_m2", |m: &Moment| Action::body(-m.pitch_accel_rad_s2))],
     separated_by: "the period of the body as a pendulum, hung up by the axle",
     feedforward: Feedforward::Declared,
@@ -92,6 +95,7 @@ pub(super) static INERTIA_ERROR: EffectKind = EffectKind {
     parameters: &[Parameter::amplitude("inertia_kg_m2", [-100.0, 100.0], "what is added to it")
         .linear("mass_kg", [-1e4, 1e4])],
     series: false,
+    trial: Trial::PLAIN,
     make_terms: |machine, _| {
         let key = INERTIA_ERROR.parameters[0].key(machine.kind);
         if machine.kind != MachineKind::Robot {

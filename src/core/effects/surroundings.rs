@@ -1,7 +1,9 @@
 //! Forces from outside the robot.
 
 use super::actuator::Lag;
-use super::kind::{EffectKind, Feedforward, NOT_INSIDE, Parameter, Place, undeclared};
+use super::kind::{
+    EffectKind, Feedforward, Form, Grid, NOT_INSIDE, Parameter, Place, Step, Trial, undeclared,
+};
 use super::law::{Action, Moment, Term};
 use super::machine::MachineKind;
 
@@ -20,10 +22,12 @@ pub(super) static TETHER_SPRING: EffectKind = EffectKind {
             "stiffness_n_m",
             [-1e4, 1e4],
             "force per way; the force is 0 at pull / stiffness",
-        ),
+        )
+        .opposing(),
         Parameter::amplitude("pull_n", [-1e3, 1e3], "force at x = 0").or(0.0),
     ],
     series: false,
+    trial: Trial::PLAIN,
     make_terms: |_, _| {
         vec![
             Term::new("stiffness_n_m", |m: &Moment| Action::force(-m.x_m, 0.0, 0.0)),
@@ -43,6 +47,7 @@ pub(super) static GROUND_SLOPE: EffectKind = EffectKind {
     machines: ROBOT,
     parameters: &[Parameter::amplitude("slope_rad", [-0.5, 0.5], "slope, whose sine is taken to be itself")],
     series: false,
+    trial: Trial::PLAIN,
     make_terms: |machine, _| {
         let weight_n = machine.weight_n();
         vec![Term::new("slope_rad", move |_: &Moment| Action::force(-weight_n, 0.0, 0.0))]
@@ -60,10 +65,12 @@ pub(super) static AERO_DRAG: EffectKind = EffectKind {
     machines: ROBOT,
     parameters: &[
         Parameter::shape("height_m", [-1.0, 3.0], "height of the force above the axle along the body")
-            .or(0.0),
-        Parameter::amplitude("drag_n_s2_m2", [-1e3, 1e3], "force at 1 m/s"),
+            .or(0.0)
+            .tried(Grid::OfHeight(&[0.0, 1.0]), Step::Fixed),
+        Parameter::amplitude("drag_n_s2_m2", [-1e3, 1e3], "force at 1 m/s").opposing(),
     ],
     series: false,
+    trial: Trial::PLAIN,
     make_terms: |_, shape| {
         let height_m = shape[0];
         vec![Term::new("drag_n_s2_m2", move |m: &Moment| {
@@ -81,8 +88,11 @@ pub(super) static ROLLING_RESISTANCE: EffectKind = EffectKind {
     summary: "horizontal force against the motion in proportion to the weight",
     place: Place::Translation,
     machines: ROBOT,
-    parameters: &[Parameter::amplitude("coefficient", [-0.5, 0.5], "force as a share of the weight")],
+    parameters: &[
+        Parameter::amplitude("coefficient", [-0.5, 0.5], "force as a share of the weight").opposing()
+    ],
     series: false,
+    trial: Trial::PLAIN,
     make_terms: |machine, _| {
         let weight_n = machine.weight_n();
         vec![Term::new("coefficient", move |m: &Moment| {
@@ -105,6 +115,7 @@ pub(super) static WHEEL_ECCENTRICITY: EffectKind = EffectKind {
         Parameter::amplitude("sin_m", [-0.1, 0.1], "part in phase with sin(x/r)"),
     ],
     series: false,
+    trial: Trial::PLAIN,
     make_terms: |machine, _| {
         let radius_m = machine.parameters.wheel_radius_m;
         let force_n_m = machine.weight_n() / radius_m;
@@ -126,10 +137,12 @@ pub(super) static WHEEL_SLIP: EffectKind = EffectKind {
     place: Place::Translation,
     machines: ROBOT,
     parameters: &[
-        Parameter::shape("relaxation_s", [1e-3, 1.0], "time in which 63 % of the slip build up"),
+        Parameter::shape("relaxation_s", [1e-3, 1.0], "time in which 63 % of the slip build up")
+            .tried(Grid::Values(&[0.005, 0.02]), Step::Factor(1.6)),
         Parameter::amplitude("slip_m_s_n", [0.0, 1.0], "slip speed per force"),
     ],
     series: false,
+    trial: Trial::cautious(2.0),
     make_terms: |machine, shape| {
         let p = machine.parameters;
         let (mass_kg, moment_kg_m) =
@@ -158,11 +171,13 @@ pub(super) static TERRAIN: EffectKind = EffectKind {
     place: Place::Translation,
     machines: ROBOT,
     parameters: &[
-        Parameter::shape("at_m", [-1e3, 1e3], "way to its middle"),
-        Parameter::shape("width_m", [0.01, 10.0], "from its middle to its steepest place"),
+        Parameter::shape("at_m", [-1e3, 1e3], "way to its middle").tried(Grid::Way, Step::OfNext(0.3)),
+        Parameter::shape("width_m", [0.01, 10.0], "from its middle to its steepest place")
+            .tried(Grid::Values(&[0.04, 0.1, 0.25]), Step::Factor(1.25)),
         Parameter::amplitude("height_m", [-0.5, 0.5], "height of its middle"),
     ],
     series: false,
+    trial: Trial { repeats: true, forms: &[Form::Law, Form::Wave], ..Trial::cautious(1.3) },
     make_terms: |machine, shape| {
         let (weight_n, at_m, width_m) = (machine.weight_n(), shape[0], shape[1]);
         vec![Term::new("height_m", move |m: &Moment| {
@@ -183,12 +198,14 @@ pub(super) static EXTERNAL_PUSH: EffectKind = EffectKind {
     place: Place::Translation,
     machines: ROBOT,
     parameters: &[
-        Parameter::shape("start_s", [0.0, 1e6], "when it begins"),
-        Parameter::shape("duration_s", [1e-3, 1e4], "how long it lasts"),
+        Parameter::shape("start_s", [0.0, 1e6], "when it begins").tried(Grid::Default, Step::Sum(0.04)),
+        Parameter::shape("duration_s", [1e-3, 1e4], "how long it lasts")
+            .tried(Grid::Default, Step::Factor(1.25)),
         Parameter::shape("height_m", [-1.0, 3.0], "its height above the axle along the body").or(0.0),
         Parameter::amplitude("force_n", [-1e4, 1e4], "force, forward positive"),
     ],
     series: false,
+    trial: Trial { repeats: true, brief: true, ..Trial::cautious(4.0) },
     make_terms: |_, shape| {
         let (start_s, end_s, height_m) = (shape[0], shape[0] + shape[1], shape[2]);
         vec![Term::new("force_n", move |m: &Moment| {

@@ -12,7 +12,7 @@ mod change;
 mod experiment;
 mod ground;
 mod motors;
-mod noise;
+pub(crate) mod noise;
 mod planar;
 mod plant;
 mod response;

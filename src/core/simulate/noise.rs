@@ -7,20 +7,20 @@ use rand_chacha::rand_core::SeedableRng;
 /// Normally distributed numbers, one independent stream per source, so that switching one source off
 /// leaves the others as they were.
 #[derive(Clone, Debug)]
-pub(super) struct Noise {
+pub(crate) struct Noise {
     generator: ChaCha8Rng,
     spare: Option<f64>,
 }
 
 impl Noise {
-    pub(super) fn new(seed: u64, stream: u64) -> Self {
+    pub(crate) fn new(seed: u64, stream: u64) -> Self {
         let mut generator = ChaCha8Rng::seed_from_u64(seed);
         generator.set_stream(stream);
         Self { generator, spare: None }
     }
 
     /// A number with mean 0 and the given standard deviation (Box-Muller).
-    pub(super) fn normal(&mut self, deviation: f64) -> f64 {
+    pub(crate) fn normal(&mut self, deviation: f64) -> f64 {
         if deviation == 0.0 {
             return 0.0;
         }

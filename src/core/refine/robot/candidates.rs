@@ -1,18 +1,32 @@
 //! What is tried: every kind of the library that can be in a robot, at shapes that its range of motion can show.
 
-use crate::effects::{EffectKind, KINDS, MachineKind};
+use crate::effects::{EffectKind, Form, Grid, KINDS, MachineKind, Parameter, Step};
 
-use super::trace::{Form, Pair, Trace};
+use super::trace::{Pair, Trace};
 
-/// How a shape parameter is refined.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Step {
-    /// Not.
-    Fixed,
-    /// By a factor.
+/// A step of a shape parameter.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Move {
     Factor(f64),
-    /// By a sum.
     Sum(f64),
+}
+
+impl Move {
+    /// The value one step on, or back for a `direction` of −1.
+    pub(super) fn from(self, value: f64, direction: f64) -> f64 {
+        match self {
+            Self::Factor(factor) => value * libm::pow(factor, direction),
+            Self::Sum(sum) => value + direction * sum,
+        }
+    }
+
+    /// Half of it.
+    pub(super) fn half(self) -> Self {
+        match self {
+            Self::Factor(factor) => Self::Factor(factor.sqrt()),
+            Self::Sum(sum) => Self::Sum(0.5 * sum),
+        }
+    }
 }
 
 /// One thing to try.
@@ -21,7 +35,6 @@ pub(super) struct Candidate {
     pub(super) kind: &'static EffectKind,
     pub(super) form: Form,
     pub(super) shape: Vec<f64>,
-    pub(super) steps: Vec<Step>,
     /// Columns at unit amplitude.
     pub(super) pairs: Vec<Pair>,
     /// The same, white.
@@ -29,20 +42,38 @@ pub(super) struct Candidate {
 }
 
 impl Candidate {
-    pub(super) fn new(
-        trace: &Trace,
-        kind: &'static EffectKind,
-        form: Form,
-        shape: Vec<f64>,
-        steps: Vec<Step>,
-    ) -> Self {
+    pub(super) fn new(trace: &Trace, kind: &'static EffectKind, form: Form, shape: Vec<f64>) -> Self {
         let pairs = trace.columns(kind, form, &shape);
-        Self { kind, form, shape, steps, pairs, white: Vec::new() }
+        Self { kind, form, shape, pairs, white: Vec::new() }
+    }
+
+    /// How each shape parameter is refined; none where it is not.
+    pub(super) fn moves(&self, com_height_m: f64) -> Vec<Option<Move>> {
+        let of = |(place, parameter): (usize, &Parameter)| match (self.form, parameter.step) {
+            // A wave has a length, and its phase is in its amplitudes.
+            (Form::Wave, _) => (place > 0).then_some(Move::Factor(1.03)),
+            (_, Step::Fixed) => None,
+            (_, Step::Factor(factor)) => Some(Move::Factor(factor)),
+            (_, Step::Sum(sum)) => Some(Move::Sum(sum)),
+            (_, Step::OfHeight(share)) => Some(Move::Sum(share * com_height_m)),
+            (_, Step::OfNext(share)) => Some(Move::Sum(share * self.shape[place + 1])),
+        };
+        self.kind.shapes().enumerate().map(of).collect()
+    }
+
+    /// Whether it has a shape that is refined.
+    pub(super) fn is_flexible(&self) -> bool {
+        self.kind.shapes().any(|parameter| parameter.step != Step::Fixed)
     }
 
     /// Whether its amplitude is 1 and its size is in its shape.
     pub(super) fn is_fixed(&self) -> bool {
         self.form == Form::Late || self.kind.amplitudes().next().is_none()
+    }
+
+    /// Whether its size is its first shape parameter.
+    pub(super) fn is_sized(&self) -> bool {
+        self.is_fixed() && self.kind.shapes().next().is_some_and(|parameter| parameter.sized)
     }
 
     /// Lowest and highest coefficient of each column.
@@ -54,172 +85,106 @@ impl Candidate {
         if self.form == Form::Driven {
             return vec![[0.0, f64::INFINITY]];
         }
-        let physical = |key: &str, range: [f64; 2]| match (self.kind.id, key) {
-            // What is against the motion, or pulls back.
-            (
-                "quadratic_drag"
-                | "aero_drag"
-                | "load_dependent_friction"
-                | "rolling_resistance"
-                | "wheel_slip",
-                _,
-            )
-            | ("tether_spring", "stiffness_n_m")
-            | ("structural_mode", _) => [0.0, range[1]],
-            _ => range,
+        let range = |parameter: &Parameter| {
+            let [low, high] = parameter.range(MachineKind::Robot);
+            [if parameter.opposing { low.max(0.0) } else { low }, high]
         };
-        let ranges: Vec<[f64; 2]> = self
-            .kind
-            .amplitudes()
-            .map(|parameter| physical(parameter.key(MachineKind::Robot), parameter.range(MachineKind::Robot)))
-            .collect();
+        let ranges: Vec<[f64; 2]> = self.kind.amplitudes().map(range).collect();
         self.pairs.iter().enumerate().map(|(i, _)| ranges[i % ranges.len()]).collect()
     }
 
     /// Whether more than one of the kind can be in a robot.
     pub(super) fn repeats(&self) -> bool {
-        self.kind.series || matches!(self.kind.id, "terrain" | "external_push" | "structural_mode")
-    }
-
-    /// How much more evidence it needs: friction about rest, which the encoder does not resolve, is easily mimicked.
-    pub(super) fn caution(&self) -> f64 {
-        match self.kind.id {
-            "low_speed_friction" | "presliding" | "backlash" | "torque_deadzone" => 1.6,
-            "wheel_slip" | "external_push" => 4.0,
-            // A mode of a few hertz of width fits what is left of any other effect.
-            "structural_mode" => 12.0,
-            "terrain" => 1.3,
-            _ => 1.0,
-        }
+        self.kind.series || self.kind.trial.repeats
     }
 }
 
 /// Highest order whose waves pass the kernel for some of the time.
 const BAND_HZ: f64 = 22.0;
 
+/// Ground waves that are tried: longest and shortest, m, and the factor between neighbours.
+const WAVES_M: [f64; 3] = [2.5, 0.1, 1.1];
+/// Most places along the way.
+const MOST_PLACES: f64 = 40.0;
+
 /// Everything to try, apart from what depends on a moment.
 pub(super) fn library(trace: &Trace) -> Vec<Candidate> {
-    let speeds: Vec<f64> = trace.moments().map(|m| m.motor_speed_rad_s.abs()).collect();
-    let typical = quantile(&speeds, 0.5).max(0.3);
-    let most_order = ((std::f64::consts::TAU * BAND_HZ / typical) as usize).clamp(8, 60);
-    let torques: Vec<f64> = trace.moments().map(|m| m.torque_nm.abs()).collect();
-    let peak = torques.iter().fold(0.0_f64, |a, b| a.max(*b));
-    let (low, high) =
-        trace.moments().fold((f64::MAX, f64::MIN), |(low, high), m| (low.min(m.x_m), high.max(m.x_m)));
-    let seconds = trace.moments().count() as f64 * trace.moments().next().map_or(1e-3, |m| m.dt_s);
+    let reach = Reach::new(trace);
     let mut found = Vec::new();
-    let mut add = |kind: &'static EffectKind, form: Form, shape: Vec<f64>, steps: &[Step]| {
-        found.push(Candidate::new(trace, kind, form, shape, steps.to_vec()));
-    };
-    use Step::{Factor, Fixed, Sum};
     for kind in KINDS.iter().copied().filter(|kind| kind.is_on(MachineKind::Robot)) {
-        match kind.id {
-            "cogging" => {
-                (1..=most_order).for_each(|order| add(kind, Form::Law, vec![order as f64], &[Fixed]))
-            }
-            "torque_ripple" => {
-                (1..=most_order.min(40)).for_each(|order| add(kind, Form::Law, vec![order as f64], &[Fixed]))
-            }
-            "position_dependent_friction" => {
-                (1..=10).for_each(|order| add(kind, Form::Law, vec![f64::from(order)], &[Fixed]))
-            }
-            "low_speed_friction" => {
-                for speed in [0.3, 0.7, 1.5] {
-                    add(kind, Form::Law, vec![speed], &[Factor(1.5)]);
-                }
-            }
-            "presliding" => {
-                for way in [0.01, 0.03, 0.1, 0.2] {
-                    add(kind, Form::Law, vec![way], &[Factor(1.6)]);
-                }
-            }
-            "thermal_friction" => {
-                for share in [0.1, 0.25, 0.6] {
-                    add(kind, Form::Law, vec![share * seconds], &[Factor(1.5)]);
-                }
-            }
-            "command_delay" | "actuator_lag" => {
-                for ms in [1.0, 1.8, 3.2, 5.0, 7.5, 11.0, 16.0] {
-                    add(kind, Form::Law, vec![ms * 1e-3], &[Factor(1.3)]);
-                }
-            }
-            "torque_saturation" => {
-                for share in [0.5, 0.6, 0.7, 0.8, 0.9] {
-                    add(kind, Form::Law, vec![share * peak], &[Factor(1.08)]);
-                }
-            }
-            "torque_deadzone" => {
-                for width in [0.01, 0.02, 0.04, 0.08] {
-                    add(kind, Form::Law, vec![width], &[Factor(1.4)]);
-                }
-            }
-            "backlash" => {
-                let rotor = 0.2 * trace.machine.parameters.wheel_inertia_kg_m2;
-                for gap in [0.005, 0.02, 0.06] {
-                    add(kind, Form::Law, vec![gap, rotor], &[Factor(1.6), Fixed]);
-                }
-            }
-            "structural_mode" => {
-                for i in 0..14 {
-                    let hz = 2.5 * libm::pow(1.14, f64::from(i));
-                    add(kind, Form::Law, vec![hz, 0.04], &[Factor(1.07), Factor(1.6)]);
-                    add(kind, Form::Driven, vec![hz, 0.04], &[Factor(1.07), Factor(1.6)]);
-                }
-            }
-            "slosh" => {
-                let height = trace.machine.parameters.com_height_m;
-                for i in 0..14 {
-                    let hz = 0.5 * libm::pow(1.16, f64::from(i));
-                    add(
-                        kind,
-                        Form::Law,
-                        vec![hz, 0.05, height],
-                        &[Factor(1.08), Factor(1.6), Sum(0.3 * height)],
-                    );
-                }
-            }
-            "aero_drag" => {
-                add(kind, Form::Law, vec![0.0], &[Fixed]);
-                add(kind, Form::Law, vec![trace.machine.parameters.com_height_m], &[Fixed]);
-            }
-            "wheel_slip" => {
-                for time in [0.005, 0.02] {
-                    add(kind, Form::Law, vec![time], &[Factor(1.6)]);
-                }
-            }
-            "terrain" => {
-                for width in [0.04, 0.1, 0.25] {
-                    let count = ((high - low) / width).clamp(1.0, 40.0) as usize;
-                    for i in 0..count {
-                        let at = low + (high - low) * (i as f64 + 0.5) / count as f64;
-                        add(kind, Form::Law, vec![at, width], &[Sum(0.3 * width), Factor(1.25)]);
-                    }
-                }
-                let mut length = 2.5;
-                while length > 0.1 {
-                    add(kind, Form::Wave, vec![0.0, length], &[Fixed, Factor(1.03)]);
-                    length /= 1.1;
-                }
-            }
-            "external_push" | "gyro_bias" => {}
-            "imu_delay" => {
-                for ms in [1.5, 3.0, 5.0, 8.0, 12.0, 18.0] {
-                    add(kind, Form::Late, vec![ms * 1e-3], &[Factor(1.2)]);
-                }
-            }
-            "friction_asymmetry" | "viscous_asymmetry" => {
-                add(kind, Form::Law, Vec::new(), &[]);
-                add(kind, Form::Forward, Vec::new(), &[]);
-            }
-            _ => {
-                let shapes: Vec<f64> = kind.shapes().filter_map(|shape| shape.default).collect();
-                if shapes.len() == kind.shapes().count() {
-                    add(kind, Form::Law, shapes, &[]);
-                }
-            }
+        for &form in kind.trial.forms {
+            let shapes = if form == Form::Wave { waves() } else { reach.shapes(kind) };
+            let candidates = shapes.into_iter().map(|shape| Candidate::new(trace, kind, form, shape));
+            found.extend(candidates.filter(|candidate| !candidate.pairs.is_empty()));
         }
     }
     found
+}
+
+fn waves() -> Vec<Vec<f64>> {
+    let [longest, shortest, factor] = WAVES_M;
+    let shorter = |length: &f64| (length / factor > shortest).then_some(length / factor);
+    std::iter::successors(Some(longest), shorter).map(|length| vec![0.0, length]).collect()
+}
+
+/// What a log's motion can show.
+struct Reach {
+    most_order: u32,
+    peak_nm: f64,
+    way_m: [f64; 2],
+    seconds: f64,
+    height_m: f64,
+    wheel_inertia_kg_m2: f64,
+}
+
+impl Reach {
+    fn new(trace: &Trace) -> Self {
+        let speeds: Vec<f64> = trace.moments().map(|m| m.motor_speed_rad_s.abs()).collect();
+        let typical = quantile(&speeds, 0.5).max(0.3);
+        let way = |[low, high]: [f64; 2], m: &crate::effects::Moment| [low.min(m.x_m), high.max(m.x_m)];
+        Self {
+            most_order: ((std::f64::consts::TAU * BAND_HZ / typical) as u32).clamp(8, 60),
+            peak_nm: trace.moments().fold(0.0, |peak, m| f64::max(peak, m.torque_nm.abs())),
+            way_m: trace.moments().fold([f64::MAX, f64::MIN], way),
+            seconds: trace.moments().count() as f64 * trace.moments().next().map_or(1e-3, |m| m.dt_s),
+            height_m: trace.machine.parameters.com_height_m,
+            wheel_inertia_kg_m2: trace.machine.parameters.wheel_inertia_kg_m2,
+        }
+    }
+
+    /// Every combination of the values of a kind's shape parameters.
+    fn shapes(&self, kind: &EffectKind) -> Vec<Vec<f64>> {
+        let parameters: Vec<&Parameter> = kind.shapes().collect();
+        // From the last one on: the way is divided by what comes after.
+        parameters.iter().rev().fold(vec![Vec::new()], |known: Vec<Vec<f64>>, parameter| {
+            let before = |rest: &Vec<f64>| -> Vec<Vec<f64>> {
+                let values = self.values(parameter, rest);
+                values.into_iter().map(|value| [&[value], rest.as_slice()].concat()).collect()
+            };
+            known.iter().flat_map(before).collect()
+        })
+    }
+
+    fn values(&self, parameter: &Parameter, next: &[f64]) -> Vec<f64> {
+        let of = |shares: &[f64], whole: f64| shares.iter().map(|share| share * whole).collect();
+        match parameter.grid {
+            Grid::Default => parameter.default.into_iter().collect(),
+            Grid::Orders(most) => (1..=most.min(self.most_order)).map(f64::from).collect(),
+            Grid::Values(values) => values.to_vec(),
+            Grid::Geometric(first, factor, count) => {
+                (0..count).map(|i| first * libm::pow(factor, f64::from(i))).collect()
+            }
+            Grid::OfLog(shares) => of(shares, self.seconds),
+            Grid::OfTorque(shares) => of(shares, self.peak_nm),
+            Grid::OfHeight(shares) => of(shares, self.height_m),
+            Grid::OfWheelInertia(share) => vec![share * self.wheel_inertia_kg_m2],
+            Grid::Way => {
+                let ([low, high], Some(apart)) = (self.way_m, next.first()) else { return Vec::new() };
+                let count = ((high - low) / apart).clamp(1.0, MOST_PLACES) as usize;
+                (0..count).map(|i| low + (high - low) * (i as f64 + 0.5) / count as f64).collect()
+            }
+        }
+    }
 }
 
 /// Value below which a share of the values are.

@@ -1,7 +1,6 @@
 //! From picks to effects with sizes, intervals and what they cannot be told from.
 
-use crate::effects::{Effect, EffectKind, KINDS, MachineKind, Role, Term};
-use crate::friction::{Stribeck, StribeckParameters};
+use crate::effects::{Effect, EffectKind, Form, KINDS, MachineKind, Role, Term};
 use crate::identify::quantile::student_t_975;
 use crate::model_file::{Model, Rig};
 use crate::refine::verdict::{Corrected, Found};
@@ -9,7 +8,8 @@ use crate::refine::verdict::{Corrected, Found};
 use super::candidates::Candidate;
 use super::motion::Readings;
 use super::search::{Fit, Search};
-use super::trace::{Form, Part};
+use super::trace::Part;
+use super::uncertainty::Uncertainty;
 
 /// Bias of a gyro below which nobody calls it an effect, rad/s, and standard errors above 0.
 const BIAS_RAD_S: f64 = 1e-3;
@@ -18,7 +18,7 @@ const BIAS_Z: f64 = 5.0;
 /// Laws of the picks with their coefficients, for the motion between the IMU's readings.
 pub(super) fn laws(search: &Search<'_>, fit: &Fit) -> Vec<(&'static EffectKind, Term, f64)> {
     let mut found = Vec::new();
-    for (pick, first) in placed(search, &search.picks) {
+    for (pick, first) in search.placed(&search.picks) {
         if pick.form == Form::Law {
             let terms = pick.kind.terms(&search.trace.machine, &pick.shape);
             let sizes = &fit.judged.coefficients[first..];
@@ -28,63 +28,52 @@ pub(super) fn laws(search: &Search<'_>, fit: &Fit) -> Vec<(&'static EffectKind, 
     found
 }
 
-/// Picks with the places of their first coefficients.
-fn placed<'a>(search: &Search<'_>, picks: &'a [Candidate]) -> Vec<(&'a Candidate, usize)> {
-    let mut next = search.nuisances.len();
-    let place = |pick: &'a Candidate| {
-        let first = next;
-        next += pick.white.len();
-        (pick, first)
-    };
-    picks.iter().map(place).collect()
+/// A pick as the library has it: shape and amplitudes, with the half widths of their intervals.
+struct Declared {
+    shape: Vec<(f64, Option<f64>)>,
+    sizes: Vec<(f64, f64)>,
 }
 
-/// Shape and amplitudes as the library has them, and half widths of the amplitudes' intervals.
 fn as_declared(
     search: &Search<'_>,
     pick: &Candidate,
-    values: &[f64],
-    widths: &[f64],
-) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
-    let (mut shape, mut values, mut widths) = (pick.shape.clone(), values.to_vec(), widths.to_vec());
+    sizes: &[(f64, f64)],
+    shapes: &[Option<f64>],
+) -> Declared {
+    let shape: Vec<(f64, Option<f64>)> = pick.shape.iter().copied().zip(shapes.iter().copied()).collect();
+    let sizes = sizes.to_vec();
     match pick.form {
-        Form::Law if pick.is_fixed() => {
-            if matches!(pick.kind.id, "command_delay" | "actuator_lag") {
-                shape[0] *= values[0];
-                widths[0] *= pick.shape[0];
-            }
-            values.clear();
+        _ if pick.is_sized() => {
+            let (factor, width) = sizes[0];
+            let mut shape = shape;
+            shape[0] = (pick.shape[0] * factor, Some(pick.shape[0] * width));
+            Declared { shape, sizes: Vec::new() }
         }
-        Form::Law => {}
-        Form::Late => {
-            shape[0] *= values[0];
-            widths[0] *= pick.shape[0];
-            values.clear();
-        }
+        _ if pick.is_fixed() => Declared { shape, sizes: Vec::new() },
         // Forward only is half of it in both directions, and the half that differs.
-        Form::Forward => {}
+        Form::Law | Form::Forward(_) | Form::Late => Declared { shape, sizes },
         Form::Driven => {
             let inertia = search.trace.machine.parameters.coefficients().c3;
-            values[0] /= inertia;
-            widths[0] /= inertia;
+            Declared { shape, sizes: vec![(sizes[0].0 / inertia, sizes[0].1 / inertia)] }
         }
         Form::Wave => {
             // The crest that is nearest to the start, as a bell of the same steepness.
             let length = pick.shape[1];
-            let size = values[0].hypot(values[1]);
-            let crest = libm::atan2(values[0], -values[1]) / std::f64::consts::TAU;
-            shape = vec![crest * length, length / std::f64::consts::TAU];
-            values = vec![size * libm::exp(0.5)];
-            widths = vec![widths[0].hypot(widths[1])];
+            let (cos, sin) = (sizes[0], sizes[1]);
+            let crest = libm::atan2(cos.0, -sin.0) / std::f64::consts::TAU;
+            Declared {
+                shape: vec![(crest * length, None), (length / std::f64::consts::TAU, None)],
+                sizes: vec![(cos.0.hypot(sin.0) * libm::exp(0.5), cos.1.hypot(sin.1) * libm::exp(0.5))],
+            }
         }
     }
-    (shape, values, widths)
 }
 
 /// The picks as effects, harmonics of one kind together.
 pub(super) fn effects(search: &Search<'_>, picks: &[Candidate], fit: &Fit) -> Vec<Found> {
     let t = student_t_975(fit.blocks.count().max(2) - 1);
-    let placed = placed(search, picks);
+    let placed = search.placed(picks);
+    let uncertainty = Uncertainty::new(search, picks, fit);
     let with = held_out_error(search, picks, fit);
     let mut found: Vec<Found> = Vec::new();
     for (index, (pick, first)) in placed.iter().enumerate() {
@@ -99,17 +88,23 @@ pub(super) fn effects(search: &Search<'_>, picks: &[Candidate], fit: &Fit) -> Ve
             members.extend(placed[index + 1..].iter().filter(|(other, _)| other.kind == pick.kind));
             members.sort_by(|a, b| size(b).total_cmp(&size(a)));
         }
-        let (mut shape, mut values, mut widths) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut shape, mut sizes) = (Vec::new(), Vec::new());
         for &(member, first) in &members {
-            let coefficients = &fit.judged.coefficients[first..first + member.white.len()];
-            let errors: Vec<f64> =
-                (first..first + member.white.len()).map(|i| t * fit.judged.standard_error(i)).collect();
-            let (own_shape, own_values, own_widths) = as_declared(search, member, coefficients, &errors);
-            shape.extend(own_shape);
-            values.extend(own_values);
-            widths.extend(own_widths);
+            let place = picks.iter().position(|pick| std::ptr::eq(pick, member)).unwrap_or(0);
+            let own = first..first + member.white.len();
+            let own: Vec<(f64, f64)> =
+                own.map(|i| (fit.judged.coefficients[i], t * uncertainty.sizes[i])).collect();
+            let shapes: Vec<Option<f64>> =
+                uncertainty.shapes[place].iter().map(|error| error.map(|error| t * error)).collect();
+            let declared = as_declared(search, member, &own, &shapes);
+            shape.extend(declared.shape);
+            sizes.extend(declared.sizes);
         }
-        let Ok(effect) = Effect::estimated(pick.kind, MachineKind::Robot, None, &shape, &values) else {
+        let first = |list: &[(f64, f64)]| -> Vec<f64> { list.iter().map(|(value, _)| *value).collect() };
+        let shape_values: Vec<f64> = shape.iter().map(|(value, _)| *value).collect();
+        let Ok(effect) =
+            Effect::estimated(pick.kind, MachineKind::Robot, None, &shape_values, &first(&sizes))
+        else {
             continue;
         };
         let others: Vec<Candidate> = picks
@@ -123,18 +118,14 @@ pub(super) fn effects(search: &Search<'_>, picks: &[Candidate], fit: &Fit) -> Ve
         let ambiguous_with =
             if members.len() == 1 { search.rivals(pick, &others, fit.score, gain) } else { Vec::new() };
         let parameters = pick.kind.parameters;
-        let sized_shape = matches!(pick.kind.id, "command_delay" | "actuator_lag" | "imu_delay");
-        let mut widths = widths.into_iter();
-        let ci95 = effect
-            .parameters()
-            .iter()
-            .enumerate()
-            .map(|(n, (_, value))| {
-                let has = parameters[n % parameters.len()].role == Role::Amplitude || sized_shape;
-                let width = if has { widths.next() } else { None };
-                width.map(|width| [value - width, value + width])
-            })
-            .collect();
+        let (mut shape_widths, mut widths) =
+            (shape.iter().map(|(_, width)| *width), sizes.iter().map(|(_, width)| Some(*width)));
+        let mut interval = |(n, (_, value)): (usize, &(String, f64))| {
+            let is_size = parameters[n % parameters.len()].role == Role::Amplitude;
+            let width = if is_size { widths.next() } else { shape_widths.next() };
+            width.flatten().map(|width| [value - width, value + width])
+        };
+        let ci95 = effect.parameters().iter().enumerate().map(&mut interval).collect();
         let units = (0..effect.parameters().len())
             .map(|n| parameters[n % parameters.len()].unit(MachineKind::Robot))
             .collect();
@@ -185,18 +176,10 @@ pub(super) fn refined(
     if numbers.validate().is_ok() {
         robot.set_parameters(numbers);
     }
-    for (pick, first) in placed(search, picks).iter().filter(|(pick, _)| pick.form == Form::Forward) {
-        let size = fit.judged.coefficients[*first];
-        let viscous = pick.kind.id == "viscous_asymmetry";
-        for curve in robot.friction.iter_mut().flatten() {
-            let p = *curve.parameters();
-            let raised = if viscous {
-                StribeckParameters { viscous_nm_s_rad: p.viscous_nm_s_rad + size, ..p }
-            } else {
-                StribeckParameters { coulomb_nm: p.coulomb_nm + size, static_nm: p.static_nm + size, ..p }
-            };
-            *curve = Stribeck::new(raised).unwrap_or(*curve);
-        }
+    for (pick, first) in search.placed(picks) {
+        let Form::Forward(both_ways) = pick.form else { continue };
+        let size = fit.judged.coefficients[first];
+        robot.effects.extend(Effect::estimated(both_ways, MachineKind::Robot, None, &[], &[size]));
     }
     robot.effects.extend(effects.iter().map(|found| found.effect.clone()));
     **robot = robot.with_effects_declared();

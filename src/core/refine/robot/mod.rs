@@ -9,6 +9,7 @@
 //! blocks ([`search`]). A second pass fills the gaps with the motion of the model that has the effects.
 
 mod candidates;
+mod chance;
 mod channels;
 mod found;
 mod health;
@@ -18,6 +19,8 @@ mod motion;
 mod nuisance;
 mod search;
 mod trace;
+mod tried;
+mod uncertainty;
 
 use std::ops::ControlFlow;
 
@@ -108,12 +111,15 @@ pub(super) fn refine(
     }
     check_names(&nuisances(&trace, &model.tolerance, &[]), &options.estimate)?;
     let mut channels = Channels::new(&trace, &trace.residual());
+    let chance = std::cell::OnceCell::new();
     for pass in 0..2 {
         report(watch, 0.1 + 0.45 * f64::from(pass))?;
         let target = trace.residual();
         let (mut free, mut tried) = (nuisances(&trace, &model.tolerance, &options.estimate), library(&trace));
         whitened(&mut tried, &mut free, &channels);
-        let mut search = Search::new(&trace, &channels, &free, &tried, &target);
+        let by_chance =
+            || *chance.get_or_init(|| by_chance(&trace, &channels, &free, &target, model, options.seed));
+        let mut search = Search::new(&trace, &channels, &free, &tried, &target, &by_chance);
         search.run(&mut |share| report(watch, 0.1 + 0.45 * f64::from(pass) + 0.4 * share))?;
         let Some(fit) = search.fit(&search.picks) else { return Ok(unfit(model, data_health)) };
         let last = pass == 1 || search.picks.is_empty();
@@ -126,6 +132,21 @@ pub(super) fn refine(
         trace.refill(&loads, 0.0);
     }
     Ok(unfit(model, data_health))
+}
+
+/// The gain that clean robots reach by chance.
+fn by_chance(
+    trace: &Trace<'_>,
+    channels: &Channels,
+    free: &[Nuisance],
+    target: &Pair,
+    model: &Model,
+    seed: u64,
+) -> f64 {
+    let search = Search::new(trace, channels, free, &[], target, &|| 0.0);
+    let Some(bare) = search.fit(&[]) else { return 0.0 };
+    let corrections: Vec<(&Nuisance, f64)> = free.iter().zip(bare.judged.coefficients).collect();
+    chance::largest_gain(trace, &model.tolerance, channels, &corrections, seed)
 }
 
 fn check_names(nuisances: &[Nuisance], names: &[String]) -> Result<(), RefineError> {
@@ -184,6 +205,7 @@ fn answer(
         (true, None) => Verdict::ModelAdequate,
     };
     let parameters = corrections(search.nuisances, used);
+    let candidates = tried::tried(search, &effects);
     let refined = found::refined(model, search, picks, used, &effects, &parameters);
     let explorer = explorer(search, &left_before, &left_after);
     Refinement {
@@ -192,7 +214,7 @@ fn answer(
         before,
         after,
         unexplained: structure.unwrap_or_default(),
-        candidates: Vec::new(),
+        candidates,
         closed_loop: None,
         next_experiment: None,
         data_health,

@@ -72,6 +72,21 @@ impl Readings {
     pub(super) fn rows(&self) -> usize {
         self.time_s.len()
     }
+
+    /// No rows, with room for some.
+    pub(super) fn emptied(&self, rows: usize) -> Self {
+        let column = || Vec::with_capacity(rows);
+        Self {
+            dt_s: self.dt_s,
+            time_s: column(),
+            x_m: column(),
+            pitch_rad: column(),
+            rate_rad_s: column(),
+            angle_rad: [column(), column()],
+            torque_nm: [column(), column()],
+            fresh: Vec::new(),
+        }
+    }
 }
 
 fn at_even_times(time: &[f64], column: &[f64], dt_s: f64, rows: usize, held: bool) -> Vec<f64> {

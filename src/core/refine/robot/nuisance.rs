@@ -1,10 +1,10 @@
 //! Declared numbers, free within their tolerances.
 
-use crate::effects::{Action, KINDS, Moment};
+use crate::effects::{Action, Form, KINDS, Moment};
 use crate::model_file::Tolerances;
 use crate::refine::select::Member;
 
-use super::trace::{Form, Pair, Trace};
+use super::trace::{Pair, Trace};
 
 /// A declared number.
 pub(super) struct Nuisance {

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::effects::{Action, EffectKind, Machine, Moment, Place, Term};
+use crate::effects::{Action, EffectKind, Form, Machine, Moment, Place, Term};
 use crate::model_file::RobotModel;
 
 use super::kernel::Kernel;
@@ -18,21 +18,6 @@ pub(super) enum Part {
 
 /// Values in r1 and r2 at every row.
 pub(super) type Pair = [Vec<f64>; 2];
-
-/// How a kind of effect enters, where there is more than one way.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Form {
-    /// As its law says.
-    Law,
-    /// Only where the motors turn forward.
-    Forward,
-    /// A mode of the body that its own turning drives.
-    Driven,
-    /// Waves of the ground: their length is the second shape parameter.
-    Wave,
-    /// The log read with an IMU that speaks late.
-    Late,
-}
 
 /// A stretch of one log.
 struct Piece {
@@ -87,6 +72,28 @@ impl<'a> Trace<'a> {
             })
             .collect();
         Self { robot, machine: Machine::robot(robot), kernel, pieces }
+    }
+
+    /// All rows of some logs for fitting.
+    pub(super) fn of_training(robot: &'a RobotModel, logs: Vec<Readings>) -> Self {
+        let kernel = Kernel::new(logs.first().map_or(1e-3, |readings| readings.dt_s));
+        let piece = |readings: Readings| {
+            let motion = Motion::new(&readings, robot, &kernel, None, 0.0);
+            Piece { parts: vec![Part::Fit; kernel.count(readings.rows())], readings, motion }
+        };
+        let pieces = logs.into_iter().map(piece).collect();
+        Self { robot, machine: Machine::robot(robot), kernel, pieces }
+    }
+
+    /// What was recorded for fitting: readings, the left motor's moments, and how many of their rows.
+    pub(super) fn recorded(&self) -> Vec<(&Readings, &[Moment], usize)> {
+        let of = |piece: &'_ Piece| piece.parts.iter().filter(|part| **part == Part::Fit).count();
+        let used = self.pieces.iter().filter(|piece| of(piece) > 0);
+        used.map(|piece| {
+            let rows = self.kernel.centre(of(piece)).min(piece.readings.rows());
+            (&piece.readings, piece.motion.moments[0].as_slice(), rows)
+        })
+        .collect()
     }
 
     /// Time between rows, s.
@@ -168,13 +175,19 @@ impl<'a> Trace<'a> {
                 let terms = kind.terms(&self.machine, shape);
                 terms.iter().map(|term| self.term(kind, term)).collect()
             }
-            Form::Forward => vec![self.pair(|| {
-                |m: &Moment| {
-                    let forward = if m.motor_speed_rad_s > 0.0 { 2.0 } else { 0.0 };
-                    let size = if kind.id == "viscous_asymmetry" { m.motor_speed_rad_s } else { 1.0 };
-                    Action::motor(-forward * size)
-                }
-            })],
+            Form::Forward(_) => {
+                let terms = kind.terms(&self.machine, shape);
+                let forward = |term: &Term| {
+                    self.pair(|| {
+                        let mut law = term.law.clone();
+                        move |m: &Moment| {
+                            let share = if m.motor_speed_rad_s > 0.0 { 2.0 } else { 0.0 };
+                            Action::default().plus(share, &law.act(m))
+                        }
+                    })
+                };
+                terms.iter().map(forward).collect()
+            }
             Form::Driven => vec![self.driven(shape)],
             Form::Wave => [0.0, 0.25]
                 .map(|quarter| {

@@ -5,21 +5,16 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 #![expect(clippy::disallowed_methods, reason = "these tests read the given logs")]
 
-#[expect(dead_code, reason = "the benchmark prints the whole table of cases")]
-#[expect(
-    clippy::collapsible_match,
-    clippy::needless_range_loop,
-    clippy::wrong_self_convention,
-    reason = "as the equations are written"
-)]
 mod generator;
 
+use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
 
 use flqr_core::model_file::Model;
 use flqr_core::record::{ColumnMap, Log, ReadOptions, Severity, read_log};
-use flqr_core::refine::{Options, Refinement, Verdict, refine};
-use generator::{Case, Conditions, Fault, cases};
+use flqr_core::refine::{Fate, Options, Refinement, Verdict, refine};
+use generator::fault::Fault;
+use generator::{Case, Conditions, cases};
 
 const SHORT: Conditions = Conditions { seconds: 24.0, excitation: 1.0, noise: 1.0 };
 
@@ -28,7 +23,7 @@ fn log(case: &Case) -> Log {
 }
 
 fn refined(case: &Case, log: Log) -> Refinement {
-    let model = Model::from_toml(&case.declared.to_toml(), "declared").unwrap();
+    let model = Model::from_toml(&case.declared.model_file(), "declared").unwrap();
     refine(&model, &[log], &[], &Options::default(), &mut |_| ControlFlow::Continue(())).unwrap()
 }
 
@@ -56,6 +51,66 @@ fn effects_are_named_with_their_sizes() {
     }
 }
 
+/// Cases judged side by side.
+fn judged(cases: Vec<Case>) -> Vec<(Case, Refinement)> {
+    let threads = NonZeroUsize::new(2).unwrap();
+    let found = flqr_core::parallel::map(&cases, threads, |case| refined(case, log(case)));
+    cases.into_iter().zip(found).collect()
+}
+
+/// Whether the robot's effect is among those named or those that cannot be told from one.
+fn is_named(fault: &Fault, found: &Refinement) -> bool {
+    found.effects.iter().any(|effect| {
+        let others = effect.ambiguous_with.iter().map(|kind| kind.id);
+        others.chain([effect.effect.id()]).any(|id| Some(id) == fault.id())
+    })
+}
+
+/// Of these cases at least so many have all of their effects named, and no more.
+fn holds(cases: Vec<Case>, least: usize) {
+    let judged = judged(cases);
+    let is_right = |(case, found): &&(Case, Refinement)| {
+        found.effects.len() == case.faults.len() && case.faults.iter().all(|fault| is_named(fault, found))
+    };
+    let (right, wrong): (Vec<_>, Vec<_>) = judged.iter().partition(is_right);
+    let told: Vec<_> = wrong.iter().map(|(case, found)| (&case.name, ids(found), found.verdict)).collect();
+    assert!(right.len() >= least, "{} of {}: {told:?}", right.len(), judged.len());
+}
+
+#[test]
+fn a_sample_of_realistic_effects_is_named() {
+    let kinds = [0, 2, 5, 10, 19, 21, 24, 25, 26, 28, 34];
+    assert!(kinds.iter().all(|&kind| kind < cases::SINGLES));
+    holds(kinds.iter().map(|&kind| cases::one(kind, 1.0, 7000 + kind as u64)).collect(), 10);
+}
+
+#[test]
+fn a_sample_of_quarter_size_is_named() {
+    let kinds = [3, 6, 8, 13, 20, 22];
+    holds(kinds.iter().map(|&kind| cases::one(kind, 0.25, 7100 + kind as u64)).collect(), 5);
+}
+
+#[test]
+fn a_sample_of_pairs_is_named() {
+    holds(cases::PAIRS[..4].iter().zip(7200..).map(|(pair, seed)| cases::two(*pair, seed)).collect(), 3);
+}
+
+#[test]
+fn sizes_are_in_their_intervals() {
+    let kinds = [6, 8, 13, 18, 20, 24];
+    let judged = judged(kinds.iter().map(|&kind| cases::one(kind, 1.0, 7300 + kind as u64)).collect());
+    let inside = |(case, found): &&(Case, Refinement)| {
+        let weight_n = (case.declared.mass + 2.0 * case.declared.wheel) * case.declared.gravity;
+        let (key, size) = case.faults[0].truth(weight_n).unwrap();
+        found.effects.iter().filter(|effect| Some(effect.effect.id()) == case.faults[0].id()).any(|effect| {
+            let place = effect.effect.parameters().iter().position(|(name, _)| name == key).unwrap();
+            let [low, high] = effect.ci95[place].unwrap();
+            (low..=high).contains(&size)
+        })
+    };
+    assert!(judged.iter().filter(inside).count() >= 5);
+}
+
 #[test]
 fn a_clean_robot_lacks_nothing_and_gives_the_same_answer_again() {
     for tolerance in [0.0, 0.01] {
@@ -75,23 +130,53 @@ fn a_clean_robot_lacks_nothing_and_gives_the_same_answer_again() {
 }
 
 #[test]
+fn clean_robots_lack_nothing_however_strong_their_noise() {
+    for noise in [0.5, 2.0] {
+        for (seed, tolerance) in [(11, 0.0), (12, 0.01)] {
+            let case = cases::clean(seed, tolerance);
+            let recording = case.record(false, Conditions { noise, ..SHORT }).unwrap();
+            let found = refined(&case, Log::from_columns("clean", recording));
+            assert_eq!((found.verdict, ids(&found)), (Verdict::ModelAdequate, vec![]), "noise × {noise}");
+        }
+    }
+}
+
+#[test]
 fn what_no_library_has_gets_no_name() {
-    let case = cases::unknown(4, 7);
+    let kinds = [0, 1, 4, 5, 7];
+    assert!(kinds.iter().all(|&kind| kind < cases::OUTSIDE));
+    let judged = judged(kinds.iter().map(|&kind| cases::unknown(kind, 7400 + kind as u64)).collect());
+    for (case, found) in &judged {
+        assert_eq!((found.verdict, ids(found)), (Verdict::UnexplainedResidual, vec![]), "{:?}", case.faults);
+        assert!(!found.unexplained.depends_on.is_empty());
+    }
+}
+
+#[test]
+fn what_was_tried_is_told() {
+    let case = Case { faults: vec![Fault::Tether { n_m: 12.0, anchor: 0.0 }], ..cases::clean(3, 0.0) };
     let found = refined(&case, log(&case));
-    assert_eq!((found.verdict, ids(&found).len()), (Verdict::UnexplainedResidual, 0));
-    assert!(!found.unexplained.depends_on.is_empty());
+    let first = &found.candidates[0];
+    assert_eq!((first.kind.id, &first.fate), ("tether_spring", &Fate::Added));
+    assert!(first.gain_percent > 10.0 && first.z > 5.0, "{first:?}");
+    let gains: Vec<f64> = found.candidates.iter().map(|tried| tried.gain_percent).collect();
+    assert!(found.candidates.len() > 1 && gains[0] >= gains[1], "{gains:?}");
 }
 
 type Damage = (&'static str, fn(&mut Vec<f64>));
 
 #[test]
 fn damaged_columns_are_told_before_any_effect() {
-    let damages: [Damage; 7] = [
+    let damages: [Damage; 11] = [
         ("pitch_rate_rad_s", |column| column.iter_mut().for_each(|v| *v = -*v)),
         ("pitch_rate_rad_s", |column| column.iter_mut().for_each(|v| *v = v.to_degrees())),
         ("pitch_rad", |column| column.fill(0.01)),
+        ("pitch_rate_rad_s", |column| column.fill(0.0)),
+        ("motor_angle_left_rad", |column| column.iter_mut().for_each(|v| *v = v.to_degrees())),
         ("motor_speed_left_rad_s", |column| column.iter_mut().for_each(|v| *v = -*v)),
         ("torque_left_nm", |column| column.fill(0.0)),
+        ("torque_left_nm", |column| column.iter_mut().for_each(|v| *v = -*v)),
+        ("torque_left_nm", |column| column.iter_mut().for_each(|v| *v *= 1000.0)),
         ("motor_angle_right_rad", |column| column.iter_mut().for_each(|v| *v = -*v)),
         ("time_s", |column| column.iter_mut().for_each(|v| *v *= 40.0)),
     ];
@@ -100,11 +185,61 @@ fn damaged_columns_are_told_before_any_effect() {
     for (name, damage) in damages {
         let mut damaged = whole.clone();
         damage(&mut damaged.columns.iter_mut().find(|column| column.name == name).unwrap().values);
-        let found = refined(&case, damaged);
-        assert_eq!((found.verdict, ids(&found).len()), (Verdict::DataUnfit, 0), "{name}");
-        let named = found.data_health.iter().any(|f| f.severity == Severity::Error && f.column == name);
-        assert!(named, "{name}: {:?}", found.data_health);
+        is_unfit(&case, damaged, name);
     }
+}
+
+/// The log is unfit, its `column` is told to be why, and nothing is named.
+fn is_unfit(case: &Case, log: Log, column: &str) {
+    let found = refined(case, log);
+    assert_eq!((found.verdict, ids(&found).len()), (Verdict::DataUnfit, 0), "{column}");
+    let errors: Vec<_> = found.data_health.iter().filter(|f| f.severity == Severity::Error).collect();
+    let names = |text: &str| column.split('/').any(|column| text.contains(column));
+    assert!(errors.iter().any(|f| names(&f.column) || names(&f.problem)), "{column}: {errors:?}");
+}
+
+#[test]
+fn short_slow_swapped_and_clipped_logs_are_unfit() {
+    let case = cases::clean(0, 0.0);
+    let whole = log(&case);
+    let with = |change: &dyn Fn(&mut Log)| {
+        let mut log = whole.clone();
+        change(&mut log);
+        log
+    };
+    let short = with(&|log| log.columns.iter_mut().for_each(|column| column.values.truncate(5000)));
+    is_unfit(&case, short, "time_s");
+    let slow = with(&|log| {
+        for column in &mut log.columns {
+            column.values = column.values.iter().copied().step_by(30).collect();
+        }
+    });
+    is_unfit(&case, slow, "time_s");
+    let swapped = with(&|log| {
+        let place = |name: &str| log.columns.iter().position(|column| column.name == name).unwrap();
+        let [left, right] = ["motor_angle_left_rad", "motor_angle_right_rad"].map(place);
+        // A turn on the spot tells the wheels apart.
+        for row in 0..log.columns[left].values.len() {
+            let turn = 0.5 * (row as f64 * 1e-3 * 0.7).sin();
+            log.columns[left].values[row] += turn;
+            log.columns[right].values[row] -= turn;
+        }
+        let names = [left, right].map(|place| log.columns[place].name.clone());
+        (log.columns[left].name, log.columns[right].name) = (names[1].clone(), names[0].clone());
+        for (name, sign) in [("motor_speed_left_rad_s", 1.0), ("motor_speed_right_rad_s", -1.0)] {
+            let column = log.columns.iter_mut().find(|column| column.name == name).unwrap();
+            for (row, value) in column.values.iter_mut().enumerate() {
+                *value += sign * 0.35 * (row as f64 * 1e-3 * 0.7).cos();
+            }
+        }
+    });
+    is_unfit(&case, swapped, "motor_speed_left_rad_s/motor_angle");
+    let clipped = with(&|log| {
+        for column in log.columns.iter_mut().filter(|column| column.name.starts_with("torque")) {
+            column.values.iter_mut().for_each(|v| *v = v.clamp(-0.25, 0.25));
+        }
+    });
+    is_unfit(&case, clipped, "torque_left_nm/torque_right_nm");
 }
 
 #[test]

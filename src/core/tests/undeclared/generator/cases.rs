@@ -16,7 +16,7 @@ pub(crate) struct Case {
 }
 
 /// Kinds of single effects of a robot, at realistic size.
-pub(crate) const SINGLES: usize = 32;
+pub(crate) const SINGLES: usize = 35;
 
 /// The effect number `kind`, drawn anew for each seed; `whole` is the robot that it is on.
 pub(crate) fn single(kind: usize, whole: &Body, random: &mut Random) -> Fault {
@@ -57,6 +57,8 @@ pub(crate) fn single(kind: usize, whole: &Body, random: &mut Random) -> Fault {
         29 => GyroBias { rad_s: random.sign() * random.between(0.01, 0.03) },
         30 => ImuDelay { seconds: size(0.005, 0.015) },
         31 => Terrain { n: weight * size(0.01, 0.03), length: size(0.25, 0.5), phase },
+        32 => Slip { m_s_n: size(1.5e-3, 4e-3), seconds: size(0.01, 0.03) },
+        33 => WheelInertia { kg_m2: whole.wheel_inertia * random.sign() * random.between(0.4, 0.8) },
         _ => Push {
             n: random.sign() * random.between(8.0, 20.0),
             at: random.between(5.0, 20.0),
@@ -73,11 +75,27 @@ pub(crate) fn outside(kind: usize, random: &mut Random) -> Fault {
         1 => WalkingOffset { nm: random.between(0.03, 0.06) },
         2 => RoughShove { n: random.between(15.0, 30.0), at: random.between(6.0, 20.0) },
         3 => RateHysteresis { nm: random.between(0.04, 0.08), seconds: random.between(0.1, 0.3) },
-        _ => Weather { n: random.between(2.0, 4.0) },
+        4 => Weather { n: random.between(2.0, 4.0) },
+        5 => TyreMemory { n: random.between(2.0, 4.0), seconds: random.between(0.3, 0.8) },
+        6 => PitchTimesWay { nm: random.sign() * random.between(40.0, 80.0) },
+        7 => BodyWander { nm: random.between(0.3, 0.6) },
+        8 => Hum { nm: random.between(0.03, 0.06), hz: random.between(3.0, 9.0) },
+        9 => Bursts { nm: random.between(0.3, 0.6), every: random.between(1.5, 4.0) },
+        10 => TwoAngles {
+            nm: random.between(0.04, 0.08),
+            order: random.between(6.0, 9.0).round(),
+            other: random.between(2.2, 2.8),
+        },
+        11 => Sag { share: random.between(0.2, 0.4), seconds: random.between(0.5, 2.0) },
+        _ => Patch {
+            n: random.between(3.0, 6.0),
+            at: random.between(-0.3, 0.3),
+            width: random.between(0.08, 0.2),
+        },
     }
 }
 /// Kinds of [`outside`].
-pub(crate) const OUTSIDE: usize = 5;
+pub(crate) const OUTSIDE: usize = 13;
 
 /// A robot and its declaration, off by `tolerance` (1 for the declared tolerances' scale of one percent).
 fn start(seed: u64, tolerance: f64) -> (Random, Body, Body) {

@@ -38,12 +38,22 @@ pub(crate) enum Fault {
     ImuDelay { seconds: f64 },
     Terrain { n: f64, length: f64, phase: f64 },
     Push { n: f64, at: f64, seconds: f64 },
+    Slip { m_s_n: f64, seconds: f64 },
+    WheelInertia { kg_m2: f64 },
     // Outside of every library: nothing logged shows what they depend on.
     HiddenFriction { nm: f64, hz: f64, damping: f64 },
     WalkingOffset { nm: f64 },
     RoughShove { n: f64, at: f64 },
     RateHysteresis { nm: f64, seconds: f64 },
     Weather { n: f64 },
+    TyreMemory { n: f64, seconds: f64 },
+    PitchTimesWay { nm: f64 },
+    BodyWander { nm: f64 },
+    Hum { nm: f64, hz: f64 },
+    Bursts { nm: f64, every: f64 },
+    TwoAngles { nm: f64, order: f64, other: f64 },
+    Sag { share: f64, seconds: f64 },
+    Patch { n: f64, at: f64, width: f64 },
 }
 
 impl Fault {
@@ -84,13 +94,21 @@ impl Fault {
             ImuDelay { .. } => "imu_delay",
             Terrain { .. } => "terrain",
             Push { .. } => "external_push",
+            Slip { .. } => "wheel_slip",
+            WheelInertia { .. } => "inertia_error",
             HiddenFriction { .. }
             | WalkingOffset { .. }
             | RoughShove { .. }
             | RateHysteresis { .. }
-            | Weather { .. } => {
-                return None;
-            }
+            | Weather { .. }
+            | TyreMemory { .. }
+            | PitchTimesWay { .. }
+            | BodyWander { .. }
+            | Hum { .. }
+            | Bursts { .. }
+            | TwoAngles { .. }
+            | Sag { .. }
+            | Patch { .. } => return None,
         })
     }
 
@@ -115,6 +133,13 @@ impl Fault {
             Rolling { n } => ("coefficient", n / weight_n),
             GyroBias { rad_s } => ("rate_rad_s", rad_s),
             ImuDelay { seconds } => ("delay_s", seconds),
+            WheelInertia { kg_m2 } => ("inertia_kg_m2", kg_m2),
+            Slip { m_s_n, .. } => ("slip_m_s_n", m_s_n),
+            Presliding { nm, .. } => ("level_nm", nm),
+            LowSpeed { nm, .. } => ("level_nm", nm),
+            Saturation { nm } => ("limit_nm", nm),
+            Slosh { kg, .. } => ("mass_kg", kg),
+            Push { n, .. } => ("force_n", n),
             _ => return None,
         })
     }
@@ -155,11 +180,21 @@ impl Fault {
             | ImuDelay { seconds: size }
             | Terrain { n: size, .. }
             | Push { n: size, .. }
+            | Slip { m_s_n: size, .. }
+            | WheelInertia { kg_m2: size }
             | HiddenFriction { nm: size, .. }
             | WalkingOffset { nm: size }
             | RoughShove { n: size, .. }
             | RateHysteresis { nm: size, .. }
-            | Weather { n: size } => *size *= share,
+            | Weather { n: size }
+            | TyreMemory { n: size, .. }
+            | PitchTimesWay { nm: size }
+            | BodyWander { nm: size }
+            | Hum { nm: size, .. }
+            | Bursts { nm: size, .. }
+            | TwoAngles { nm: size, .. }
+            | Sag { share: size, .. }
+            | Patch { n: size, .. } => *size *= share,
             // A higher limit clips less.
             Saturation { nm } => *nm *= 1.0 + 0.35 * (1.0 - share),
         }
@@ -180,6 +215,13 @@ pub(crate) struct Memory {
     pub(crate) gust: f64,
     pub(crate) slow_speed: f64,
     pub(crate) shove: f64,
+    pub(crate) slip: f64,
+    pub(crate) slip_rate: f64,
+    pub(crate) tyre: f64,
+    pub(crate) wander: f64,
+    pub(crate) burst: f64,
+    pub(crate) heat: f64,
+    pub(crate) phase: f64,
 }
 
 /// Speed, angle, torque and the rest that an effect's torque in one motor depends on.
@@ -189,25 +231,22 @@ pub(crate) struct Now {
     pub(crate) w: f64,
     pub(crate) direction: f64,
     pub(crate) asked: f64,
+    /// The wheel's own turn against the ground.
+    pub(crate) rolled: f64,
 }
 
 impl Fault {
     /// Extra torque inside one motor, against the declared curve; `level` is that curve's Coulomb part.
     pub(crate) fn motor(&self, now: Now, memory: &Memory, level: f64) -> f64 {
         use Fault::*;
-        let Now { angle, w, direction, asked, .. } = now;
+        let Now { angle, w, direction, asked, rolled } = now;
         match *self {
             Cogging { order, nm, phase } => nm * (order * angle + phase).sin(),
             TorqueRipple { order, share, phase } => asked * share * (order * angle + phase).sin(),
             QuadraticDrag { nm_s2 } => -nm_s2 * w * w.abs(),
             ViscousAsymmetry { nm_s } => -nm_s * w.max(0.0),
-            FrictionAsymmetry { nm } => {
-                if direction > 0.0 {
-                    -nm
-                } else {
-                    0.0
-                }
-            }
+            FrictionAsymmetry { nm } if direction > 0.0 => -nm,
+            FrictionAsymmetry { .. } => 0.0,
             Coulomb { nm } => -nm * direction,
             Viscous { nm_s } => -nm_s * w,
             LowSpeed { nm, speed } => -nm * direction * (-w.abs() / speed).exp(),
@@ -218,6 +257,10 @@ impl Fault {
             HiddenFriction { nm, .. } => -nm * direction * memory.hidden[0].tanh(),
             RateHysteresis { nm, .. } => -nm * (2.0 * (memory.slow_speed - w)).tanh() * direction,
             WalkingOffset { nm } => nm * memory.walk,
+            Hum { nm, .. } => nm * memory.phase.sin(),
+            Bursts { nm, .. } => nm * memory.burst,
+            TwoAngles { nm, order, other } => nm * (order * angle).sin() * (other * rolled).sin(),
+            Sag { share, .. } => share * asked * (1.0 - memory.heat),
             _ => 0.0,
         }
     }
@@ -232,7 +275,7 @@ impl Fault {
         memory: &Memory,
     ) -> (f64, f64) {
         use Fault::*;
-        let [x, v, ..] = *state;
+        let [x, v, pitch, ..] = *state;
         match *self {
             Slope { rad } => (-weight_n * rad.sin(), 0.0),
             Tether { n_m, anchor } => (-n_m * (x - anchor), 0.0),
@@ -243,6 +286,13 @@ impl Fault {
             Push { n, at, seconds } => (if t >= at && t < at + seconds { n } else { 0.0 }, 0.0),
             RoughShove { n, at } => (if (at..at + 0.6).contains(&t) { n * memory.shove } else { 0.0 }, 0.0),
             Weather { n } => (n * memory.gust, 0.0),
+            TyreMemory { n, .. } => (-n * memory.tyre, 0.0),
+            PitchTimesWay { nm } => (0.0, nm * x * pitch),
+            BodyWander { nm } => (0.0, nm * memory.wander),
+            Patch { n, at, width } => {
+                let inside = (-((x - at) / width).powi(4)).exp();
+                (-n * inside * (v / 0.01).tanh(), 0.0)
+            }
             _ => (0.0, 0.0),
         }
     }

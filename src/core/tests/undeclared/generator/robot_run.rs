@@ -69,7 +69,7 @@ impl Plant<'_> {
         for motor in 0..2 {
             let curve = &self.whole.motors[motor];
             let angle = s[0] / self.whole.radius - s[2] + self.angle_zero[motor];
-            let now = Now { angle, w, direction, asked: self.shaft[motor] };
+            let now = Now { angle, w, direction, asked: self.shaft[motor], rolled: s[0] / self.whole.radius };
             shaft += self.shaft[motor] - curve.at(w, direction);
             for (fault, memory) in self.faults.iter().zip(&self.memory) {
                 shaft += fault.motor(now, &memory[motor], curve.coulomb);
@@ -91,6 +91,12 @@ impl Plant<'_> {
                     axle += force;
                     body +=
                         height * s[2].cos() * force + kg * self.whole.gravity * (height * s[2].sin() + s[4]);
+                }
+                Fault::Slip { .. } => {
+                    // The robot is slower than its wheels: what it has of their acceleration is less.
+                    let (mass, rate) = (self.whole.mass, memory[0].slip_rate);
+                    axle += (mass + 2.0 * self.whole.wheel) * rate;
+                    body += mass * self.whole.height * s[2].cos() * rate;
                 }
                 Fault::PitchOffset { rad } => {
                     body += self.whole.mass
@@ -158,7 +164,8 @@ impl Plant<'_> {
             grip += curve.standing;
             let angle = s[0] / self.whole.radius - s[2] + self.angle_zero[motor];
             for (fault, memory) in self.faults.iter().zip(&self.memory) {
-                let forward = Now { angle, w: 0.0, direction: 1.0, asked: self.shaft[motor] };
+                let rolled = s[0] / self.whole.radius;
+                let forward = Now { angle, w: 0.0, direction: 1.0, asked: self.shaft[motor], rolled };
                 let backward = Now { direction: -1.0, ..forward };
                 grip -= 0.5
                     * (fault.motor(forward, &memory[motor], curve.coulomb)
@@ -205,6 +212,7 @@ impl Plant<'_> {
 
     fn remember(&mut self, s: &State, random: &mut Random) {
         let w = self.speed(s);
+        let force = (self.shaft[0] + self.shaft[1]) / self.whole.radius;
         for (fault, memory) in self.faults.iter().zip(&mut self.memory) {
             let shared = (random.normal(), random.normal());
             for memory in memory {
@@ -229,6 +237,26 @@ impl Plant<'_> {
                     }
                     Fault::RoughShove { .. } => {
                         memory.shove += TICK / 0.02 * (1.0 + 6.0 * shared.1 - memory.shove)
+                    }
+                    Fault::Slip { m_s_n, seconds } => {
+                        memory.slip_rate = (m_s_n * force - memory.slip) / seconds;
+                        memory.slip += TICK * memory.slip_rate;
+                    }
+                    Fault::TyreMemory { seconds, .. } => {
+                        memory.tyre += TICK / seconds * ((s[1] / 0.05).tanh() - memory.tyre);
+                    }
+                    Fault::BodyWander { .. } => {
+                        memory.wander += TICK * -memory.wander / 2.0 + (2.0 * TICK / 2.0).sqrt() * shared.0;
+                    }
+                    Fault::Hum { hz, .. } => memory.phase += TAU * hz * TICK + 0.03 * shared.0,
+                    Fault::Bursts { every, .. } => {
+                        let on = (self.t / every).fract() * every < 0.25;
+                        memory.burst = if on { shared.1 * 4.0 } else { 0.0 };
+                    }
+                    Fault::Sag { seconds, .. } => {
+                        // About 1 in the mean, of a torque of 0.4 N m.
+                        let power = (self.shaft[0] / 0.4).powi(2).min(6.0);
+                        memory.heat += TICK / seconds * (power - memory.heat);
                     }
                     Fault::Backlash { gap } => {
                         let side = memory.side + w * TICK;
@@ -336,6 +364,7 @@ pub(crate) fn run(
             Fault::Mass { kg } => whole.mass += kg,
             Fault::Height { m } => whole.height += m,
             Fault::Inertia { kg_m2 } => whole.inertia += kg_m2,
+            Fault::WheelInertia { kg_m2 } => whole.wheel_inertia += kg_m2,
             Fault::Slosh { kg, .. } => rigid_mass -= kg,
             Fault::Mode { share, .. } => rigid_inertia -= share * whole.inertia,
             _ => {}
@@ -393,8 +422,8 @@ pub(crate) fn run(
         });
         let values = [t, x, x_dot, pitch, gyro, angle, angle + 0.41, speed, speed, asked[0], asked[1]];
         columns.iter_mut().zip(values).for_each(|((_, column), value)| column.push(value));
-        for motor in 0..2 {
-            plant.shaft[motor] = through_actuator(faults, &mut plant.memory, motor, asked[motor]);
+        for (motor, &asked) in asked.iter().enumerate() {
+            plant.shaft[motor] = through_actuator(faults, &mut plant.memory, motor, asked);
         }
         // White over the band of the log: 0.003 N m, 0.06 N and 0.007 N m per root of a hertz.
         let white = (0.5 / TICK).sqrt() * noise;

@@ -1,0 +1,189 @@
+//! Forward selection with swaps and a backward check.
+
+use crate::refine::error::RefineError;
+
+use super::screen::Screen;
+use super::{Candidate, Fit, Search};
+
+/// Share of the error on left-out blocks that an effect must explain, and the least in units of the noise.
+const LEAST_SHARE: f64 = 0.002;
+const LEAST_GAIN: f64 = 16.0;
+/// Standard errors above 0 of an effect's size, by the jackknife over blocks.
+pub(in crate::refine::robot) const LEAST_Z: f64 = 3.0;
+/// Least impulse of a push as a share of the weight, s: sticking that lets go looks like a smaller one.
+const LEAST_IMPULSE_S: f64 = 0.003;
+/// Most effects that are named.
+const MOST: usize = 6;
+/// Candidates whose shapes are refined and whose left-out error is worked out.
+const SHORT_LIST: usize = 14;
+const REFINED: usize = 5;
+/// Gain in units of the noise below which nothing is looked at, and share of the leader's below which no shape is refined.
+const LEAST_LOOK: f64 = 8.0;
+const WORTH_REFINING: f64 = 0.3;
+/// What a shape parameter and a unit of caution cost against a rival, in units of the noise.
+const HANDICAP: [f64; 2] = [3.0, 10.0];
+/// Gain in units of the least one up to which clean robots are asked what chance does.
+const DOUBT: f64 = 3.0;
+
+impl Search<'_> {
+    /// Gain below which nothing is named.
+    pub(in crate::refine::robot) fn least(&self, score: f64) -> f64 {
+        LEAST_GAIN.max(LEAST_SHARE * score)
+    }
+
+    /// Finds effects until none is worth its name.
+    ///
+    /// # Errors
+    /// The watcher, who is told the share of the work that is done, ended it.
+    pub(in crate::refine::robot) fn run(
+        &mut self,
+        watch: &mut dyn FnMut(f64) -> Result<(), RefineError>,
+    ) -> Result<(), RefineError> {
+        let Some(mut now) = self.fit(&[]) else { return Ok(()) };
+        while self.picks.len() < MOST {
+            watch(self.picks.len() as f64 / MOST as f64)?;
+            let ranked = self.ranked(&self.picks, &now);
+            if self.picks.is_empty() {
+                self.tried.clone_from(&ranked);
+            }
+            let Some((pick, fit)) = Self::first_of(ranked) else { break };
+            let mut picks = self.picks.clone();
+            picks.push(pick);
+            if !self.is_worth(&picks, &now, &fit) {
+                break;
+            }
+            self.picks = picks;
+            now = fit;
+            self.swap(&mut now);
+        }
+        Ok(())
+    }
+
+    /// Whether the last pick is.
+    fn is_worth(&self, picks: &[Candidate], before: &Fit, with: &Fit) -> bool {
+        let Some(last) = picks.last() else { return false };
+        if last.kind.trial.brief {
+            let impulse = with.judged.coefficients[with.members.len() - 1].abs() * last.shape[1];
+            if impulse < LEAST_IMPULSE_S * self.trace.machine.weight_n() {
+                return false;
+            }
+        }
+        let (gain, least) = ((before.score - with.score) / last.kind.trial.caution, self.least(before.score));
+        let is_sure = last.kind.trial.brief || self.z(last, with) > LEAST_Z;
+        gain > least && is_sure && (gain > DOUBT * least || gain > (self.by_chance)())
+    }
+
+    /// Standard errors of the last pick's size above 0.
+    pub(in crate::refine::robot) fn z(&self, last: &Candidate, with: &Fit) -> f64 {
+        let first = with.members.len() - last.white.len();
+        let lengths: Vec<f64> =
+            (first..with.members.len()).map(|column| with.blocks.length(column)).collect();
+        with.judged.z(first..with.members.len(), &lengths)
+    }
+
+    /// The largest gain of anything that is tried beside nothing else, each by the evidence that it needs.
+    pub(in crate::refine::robot) fn largest(&self) -> f64 {
+        let Some(bare) = self.fit(&[]) else { return 0.0 };
+        let gains = self.ranked(&[], &bare).into_iter().filter(|(pick, _)| !pick.kind.trial.brief);
+        gains.map(|(pick, fit)| (bare.score - fit.score) / pick.kind.trial.caution).fold(0.0, f64::max)
+    }
+
+    /// Replaces picks where another does better, and drops those that others have made needless.
+    fn swap(&mut self, now: &mut Fit) {
+        for _ in 0..2 {
+            let mut changed = false;
+            let mut place = 0;
+            while place < self.picks.len() && self.picks.len() > 1 {
+                let mut others = self.picks.clone();
+                let removed = others.remove(place);
+                let Some(without) = self.fit(&others) else { return };
+                if without.score - now.score < self.least(now.score) {
+                    self.picks = others;
+                    *now = without;
+                    changed = true;
+                    continue;
+                }
+                if let Some((pick, fit)) = self.best(&others, &without)
+                    && fit.score < now.score - 0.5 * self.least(now.score)
+                    && (pick.kind != removed.kind || pick.shape != removed.shape)
+                {
+                    others.insert(place, pick);
+                    if let Some(fit) = self.fit(&others) {
+                        self.picks = others;
+                        *now = fit;
+                        changed = true;
+                    }
+                }
+                place += 1;
+            }
+            if !changed {
+                return;
+            }
+        }
+    }
+
+    /// The candidate that lowers the score most, its shape refined.
+    fn best(&self, picks: &[Candidate], now: &Fit) -> Option<(Candidate, Fit)> {
+        Self::first_of(self.ranked(picks, now))
+    }
+
+    fn first_of(ranked: Vec<(Candidate, Fit)>) -> Option<(Candidate, Fit)> {
+        // Where others do as well, what needs less is preferred.
+        let handicap = |pick: &Candidate| {
+            HANDICAP[0] * pick.shape.len() as f64 + HANDICAP[1] * (pick.kind.trial.caution - 1.0)
+        };
+        let price = |(pick, fit): &(Candidate, Fit)| fit.score + handicap(pick);
+        ranked.into_iter().min_by(|a, b| price(a).total_cmp(&price(b)))
+    }
+
+    /// The most promising candidates, their shapes refined, with their fits beside the picks.
+    pub(in crate::refine::robot) fn ranked(&self, picks: &[Candidate], now: &Fit) -> Vec<(Candidate, Fit)> {
+        let Some(screen) = Screen::new(self, picks) else { return Vec::new() };
+        let mut list = self.short_list(&screen, picks, now);
+        let leader = list.first().map_or(0.0, |(gain, _)| *gain);
+        let refined = list
+            .iter_mut()
+            .filter(|(gain, candidate)| *gain > WORTH_REFINING * leader && candidate.is_flexible());
+        for (gain, candidate) in refined.take(REFINED) {
+            self.refine_shape(&screen, candidate, *gain);
+        }
+        let fitted = |(_, candidate): (f64, Candidate)| {
+            let mut tried = picks.to_vec();
+            tried.push(candidate);
+            let fit = self.fit(&tried)?;
+            Some((tried.pop()?, fit))
+        };
+        list.into_iter().filter_map(fitted).collect()
+    }
+
+    /// Candidates by what they would gain as they are; of one that is flexible only its best shape.
+    fn short_list(&self, screen: &Screen, picks: &[Candidate], now: &Fit) -> Vec<(f64, Candidate)> {
+        let pushes = self.pushes(picks, &now.judged.coefficients);
+        let wanted = |candidate: &&Candidate| {
+            candidate.repeats()
+                && !picks.iter().any(|pick| pick.kind == candidate.kind && pick.shape == candidate.shape)
+                || picks.iter().all(|pick| pick.kind != candidate.kind)
+        };
+        let mut gains: Vec<(f64, &Candidate)> = self
+            .library
+            .iter()
+            .chain(&pushes)
+            .filter(wanted)
+            .map(|candidate| (screen.gain(candidate), candidate))
+            .filter(|(gain, _)| *gain > LEAST_LOOK)
+            .collect();
+        gains.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let mut list: Vec<(f64, Candidate)> = Vec::new();
+        for (gain, candidate) in gains {
+            let alike =
+                list.iter().filter(|(_, o)| o.kind == candidate.kind && o.form == candidate.form).count();
+            if alike < if candidate.is_flexible() { 1 } else { 3 } {
+                list.push((gain, candidate.clone()));
+            }
+            if list.len() >= SHORT_LIST {
+                break;
+            }
+        }
+        list
+    }
+}

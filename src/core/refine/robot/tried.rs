@@ -1,0 +1,80 @@
+//! What was tried, and what became of it.
+
+use crate::effects::{EffectKind, KINDS, MachineKind};
+use crate::refine::verdict::{Fate, Found, Tried};
+
+use super::candidates::Candidate;
+use super::search::{Fit, LEAST_Z, Screen, Search};
+
+/// Share of an effect's columns that declared numbers within their tolerances must leave, so that it can be tested.
+const TESTABLE: f64 = 0.05;
+
+/// The candidates of the first look, best first, then what this log cannot test.
+pub(super) fn tried(search: &Search<'_>, effects: &[Found]) -> Vec<Tried> {
+    let Some(bare) = search.fit(&[]) else { return Vec::new() };
+    let mut list: Vec<&(Candidate, Fit)> = search.tried.iter().collect();
+    list.sort_by(|a, b| a.1.score.total_cmp(&b.1.score));
+    let entry = |(candidate, fit): &&(Candidate, Fit)| {
+        let gain = bare.score - fit.score;
+        let z = search.z(candidate, fit);
+        Tried {
+            kind: candidate.kind,
+            detail: detail(candidate),
+            gain_percent: 100.0 * gain / bare.score,
+            z,
+            fate: fate(search, effects, candidate.kind, gain, &bare, z),
+        }
+    };
+    let mut found: Vec<Tried> = list.iter().map(entry).collect();
+    found.extend(untestable(search));
+    found
+}
+
+fn fate(
+    search: &Search<'_>,
+    effects: &[Found],
+    kind: &'static EffectKind,
+    gain: f64,
+    bare: &Fit,
+    z: f64,
+) -> Fate {
+    if effects.iter().any(|found| found.effect.kind() == kind) {
+        return Fate::Added;
+    }
+    if let Some(found) = effects.iter().find(|found| found.ambiguous_with.contains(&kind)) {
+        return Fate::NotToldFrom(found.effect.kind());
+    }
+    if gain < kind.trial.caution * search.least(bare.score) {
+        Fate::TooSmall
+    } else if z < LEAST_Z || effects.is_empty() {
+        Fate::NotSure
+    } else {
+        Fate::Explained
+    }
+}
+
+fn untestable(search: &Search<'_>) -> Vec<Tried> {
+    let Some(screen) = Screen::new(search, &[]) else { return Vec::new() };
+    let own = |kind: &EffectKind| {
+        let shapes = search.library.iter().filter(|candidate| candidate.kind == kind);
+        shapes.map(|candidate| screen.own_share(candidate)).fold(f64::NEG_INFINITY, f64::max)
+    };
+    let of_robots = KINDS.iter().copied().filter(|kind| kind.is_on(MachineKind::Robot));
+    of_robots
+        .filter(|kind| search.tried.iter().all(|(candidate, _)| candidate.kind != *kind))
+        .filter(|kind| (f64::NEG_INFINITY..TESTABLE).contains(&own(kind)) && own(kind).is_finite())
+        .map(|kind| Tried { kind, detail: String::new(), gain_percent: 0.0, z: 0.0, fate: Fate::NotTestable })
+        .collect()
+}
+
+/// The first shape parameter in words.
+fn detail(candidate: &Candidate) -> String {
+    let Some((parameter, value)) = candidate.kind.shapes().zip(&candidate.shape).next() else {
+        return String::new();
+    };
+    match parameter.unit(MachineKind::Robot) {
+        "1/turn" => format!("order {value:.0}"),
+        "s" if *value < 0.1 => format!("{:.1} ms", 1e3 * value),
+        unit => format!("{value:.3} {unit}"),
+    }
+}
