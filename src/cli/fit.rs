@@ -6,11 +6,11 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use flqr_core::identify::{self, Bounds, Estimate, FitOptions, FitReport, FrictionPair, Method, Motor};
+use flqr_core::identify::{self, Bounds, Estimate, FitOptions, FitReport, FrictionPair, Method};
 use flqr_core::record::{ColumnMap, HealthFinding, Mapping};
 use serde::Serialize;
 
-use super::input;
+use super::input::{self, MotorName};
 use super::output::{Failure, Output, number};
 use super::progress::Progress;
 
@@ -41,12 +41,6 @@ pub(crate) struct Arguments {
     /// Seed of the swarm
     #[arg(long, default_value_t = 1)]
     seed: u64,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum MotorName {
-    Left,
-    Right,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -85,10 +79,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let map = ColumnMap::new(arguments.map.clone()).map_err(Failure::from_error)?;
     let logs =
         arguments.logs.iter().map(|path| input::read_log(path, &map)).collect::<Result<Vec<_>, _>>()?;
-    let motor = match arguments.motor {
-        MotorName::Left => Motor::Left,
-        MotorName::Right => Motor::Right,
-    };
+    let motor = arguments.motor.into();
     let options = FitOptions {
         method: match arguments.method {
             MethodName::Best => Method::Best,

@@ -5,11 +5,30 @@ use std::io::{self, BufReader, Read};
 use std::ops::ControlFlow;
 use std::path::Path;
 
+use clap::ValueEnum;
 use flqr_core::model_file::{Model, RobotModel};
 use flqr_core::record::{self, ColumnMap, Log, ReadOptions};
 
+use flqr_core::robot::Motor;
+
 use super::output::Failure;
 use super::progress::Progress;
+
+/// A motor by its name on the command line.
+#[derive(Clone, Copy, ValueEnum)]
+pub(crate) enum MotorName {
+    Left,
+    Right,
+}
+
+impl From<MotorName> for Motor {
+    fn from(name: MotorName) -> Self {
+        match name {
+            MotorName::Left => Self::Left,
+            MotorName::Right => Self::Right,
+        }
+    }
+}
 
 /// Largest text file that is read whole, bytes: a Riccati equation with 500 states is smaller.
 const LARGEST_TEXT: u64 = 64 << 20;

@@ -10,7 +10,7 @@ use clap::{Args, CommandFactory, ValueEnum};
 use flqr_core::identify::Motor;
 use flqr_core::model_file::Model;
 use flqr_core::record;
-use flqr_core::robot::State;
+use flqr_core::robot::{Payload, State};
 use flqr_core::simulate::{
     self, BenchRun, ControllerChoice, Experiment, ExperimentError, Outcome, Push, Run, Scenario, SpeedGains,
     Statistics, StepResponse, Summary,
@@ -18,6 +18,7 @@ use flqr_core::simulate::{
 use nalgebra::{Matrix2x4, RowVector4};
 use serde::Serialize;
 
+use super::input::MotorName;
 use super::output::{Failure, Output, complain};
 use super::progress::Progress;
 use super::{Cli, file, input};
@@ -78,6 +79,18 @@ struct ScenarioSettings {
     /// Duration of the kick, s [default: 0.1]
     #[arg(long, value_name = "S")]
     kick_duration: Option<f64>,
+    /// Slope of the ground, upward in the direction of x, rad, on top of the model's [default: 0]
+    #[arg(long, value_name = "RAD", allow_negative_numbers = true)]
+    slope: Option<f64>,
+    /// Load on the body that the controller does not know of, kg
+    #[arg(long, value_name = "KG")]
+    payload: Option<f64>,
+    /// Where that load sits: above the axle along the body, m [default: the centre of mass]
+    #[arg(long, value_name = "M", allow_negative_numbers = true, requires = "payload")]
+    payload_height: Option<f64>,
+    /// Torques of the multisine on the ground, as a share of the usual ones [default: 1]
+    #[arg(long, value_name = "SHARE")]
+    torque_scale: Option<f64>,
     /// Where the kick acts: above the axle along the body, m [default: the centre of mass]
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     kick_height: Option<f64>,
@@ -91,12 +104,6 @@ enum ControllerName {
     Lqr,
     Flqr,
     Pi,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum MotorName {
-    Left,
-    Right,
 }
 
 /// One row of K.
@@ -164,7 +171,7 @@ fn not_negative(text: &str) -> Result<f64, String> {
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
-    let experiment = experiment(arguments);
+    let mut experiment = experiment(arguments);
     if let Err(refused) = experiment.check_usage() {
         Cli::command().error(ErrorKind::ArgumentConflict, refused).exit();
     }
@@ -173,6 +180,11 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         Cli::command().error(ErrorKind::ArgumentConflict, refused).exit();
     }
     let declared = input::load_model(&arguments.model)?;
+    if let (Some(payload), None, Some(robot)) =
+        (&mut experiment.payload, arguments.settings.payload_height, declared.robot())
+    {
+        payload.height_m = robot.parameters.com_height_m;
+    }
     let actual = arguments.robot.as_deref().map(input::load_model).transpose()?;
     let actual = actual.as_ref().unwrap_or(&declared);
     let in_file = |error: ExperimentError| match error {
@@ -191,10 +203,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         Err(ExperimentError::NotFinite { kept, .. }) => Some(&**kept),
         Err(_) => None,
     };
-    let motor = match arguments.motor {
-        None | Some(MotorName::Left) => Motor::Left,
-        Some(MotorName::Right) => Motor::Right,
-    };
+    let motor = arguments.motor.map_or(Motor::Left, Motor::from);
     if let (Some(path), Some(kept)) = (&arguments.log, kept) {
         write_log(path, kept, motor)?;
     }
@@ -238,6 +247,13 @@ fn experiment(arguments: &Arguments) -> Experiment {
         speed_gains: arguments.kp.zip(arguments.ki).map(|(kp, ki)| SpeedGains { kp, ki }),
         gain: arguments.gain.map(|MotorGain(row)| Matrix2x4::from_rows(&[RowVector4::from(row); 2])),
         leg_height_m: arguments.leg_height,
+        slope_rad: settings.slope.unwrap_or(default.slope_rad),
+        payload: settings.payload.map(|mass_kg| Payload {
+            mass_kg,
+            height_m: settings.payload_height.unwrap_or(0.0),
+            forward_m: 0.0,
+        }),
+        torque_scale: settings.torque_scale.unwrap_or(default.torque_scale),
         ..default
     }
 }

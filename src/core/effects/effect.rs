@@ -3,7 +3,7 @@
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
 
-use super::kind::{Declared, EffectKind, Parameter, Role};
+use super::kind::{Declared, EffectKind, Feedforward, Parameter, Role};
 use super::law::{Action, Law, Moment, Term};
 use super::machine::{Machine, MachineKind};
 use super::{KINDS, kind};
@@ -15,6 +15,8 @@ pub struct Effect {
     kind: &'static EffectKind,
     motor: Option<Motor>,
     parameters: Vec<(String, f64)>,
+    /// Whether a controller may cancel it, where its kind can be.
+    fed: bool,
 }
 
 /// A value of an effect that the library refuses.
@@ -71,7 +73,7 @@ impl Effect {
             check(id, &key, parameter, machine, value)?;
             parameters.push((key, value));
         }
-        Ok(Self { kind, motor, parameters })
+        Ok(Self { kind, motor, parameters, fed: true })
     }
 
     /// The effect of an estimate: shape parameters as [`EffectKind::terms`] takes them, and the amplitudes in the order
@@ -110,6 +112,26 @@ impl Effect {
     /// Its name.
     pub fn id(&self) -> &'static str {
         self.kind.id
+    }
+
+    /// The same for controllers to cancel, or to leave as it is (`feedforward = false` in a model file). The simulator
+    /// has it either way.
+    ///
+    /// # Errors
+    /// One that no controller can cancel.
+    pub fn with_feedforward(self, fed: bool) -> Result<Self, EffectError> {
+        match self.kind.feedforward {
+            Feedforward::Never(reason) if fed => {
+                let problem = format!("{} cannot be fed forward ({reason}): remove the key", self.kind.id);
+                Err(EffectError::at("feedforward", problem))
+            }
+            _ => Ok(Self { fed, ..self }),
+        }
+    }
+
+    /// Whether a controller cancels it.
+    pub fn is_fed_forward(&self) -> bool {
+        self.fed && self.kind.feedforward == Feedforward::Causal
     }
 
     /// The motor that it is in; none for both, and for effects that are in no motor.
@@ -196,6 +218,9 @@ impl Serialize for Effect {
         }
         for (key, value) in &self.parameters {
             table.serialize_entry(key, value)?;
+        }
+        if !self.fed {
+            table.serialize_entry("feedforward", &false)?;
         }
         table.end()
     }

@@ -1,7 +1,6 @@
 //! The torque that cancels the effects inside a motor.
 
 use super::effect::{Effect, EffectLaw};
-use super::kind::Feedforward;
 use super::law::{Action, Law, Moment};
 use super::machine::Machine;
 use crate::friction::Compensation;
@@ -28,11 +27,10 @@ impl PartialEq for EffectFeedforward {
 }
 
 impl EffectFeedforward {
-    /// The feedforward of those effects that are causal; none where no effect is. Of dry friction the compensation's
+    /// The feedforward of those effects that are causal and not kept from it; none where no effect is. Of dry friction the compensation's
     /// share is fed forward, with its direction smoothed as that of the declared curve.
     pub fn new(machine: &Machine, effects: &[Effect], compensation: Compensation) -> Option<Self> {
-        let causal =
-            |effect: &&Effect| effect.kind().feedforward == Feedforward::Causal && effect.kind().per_motor();
+        let causal = |effect: &&Effect| effect.is_fed_forward() && effect.kind().per_motor();
         let effects: Vec<Effect> = effects.iter().filter(causal).cloned().collect();
         let laws = |motor| {
             let own = effects.iter().filter(|effect| effect.is_in(motor));

@@ -99,12 +99,26 @@ fn effect(table: &toml::Table, machine: MachineKind) -> Result<Effect, (Option<S
         }
     };
     let mut parameters = Vec::new();
-    for (key, value) in table.iter().filter(|(key, _)| *key != "id" && *key != "motor") {
+    let fed = match table.get("feedforward").map(|fed| (fed, fed.as_bool())) {
+        None => None,
+        Some((_, Some(fed))) => Some(fed),
+        Some((fed, None)) => {
+            return refused("feedforward", format!("feedforward = {fed}: use true or false"));
+        }
+    };
+    let others = ["id", "motor", "feedforward"];
+    for (key, value) in table.iter().filter(|(key, _)| !others.contains(&key.as_str())) {
         let number = value.as_float().or_else(|| value.as_integer().map(|whole| whole as f64));
         let Some(number) = number else {
             return refused(key, format!("{key} = {value} is not a number: write it as {key} = 0.1"));
         };
         parameters.push((key.as_str(), number));
     }
-    Effect::new(id, machine, motor, parameters).map_err(|error| (error.key, error.problem))
+    let with_feedforward = |effect: Effect| match fed {
+        Some(fed) => effect.with_feedforward(fed),
+        None => Ok(effect),
+    };
+    Effect::new(id, machine, motor, parameters)
+        .and_then(with_feedforward)
+        .map_err(|error| (error.key, error.problem))
 }

@@ -71,6 +71,9 @@ pub enum Mark {
     Step,
     /// Not joined.
     Scatter,
+    /// The outline of a tinted area, along one side and back along the other; goes without a name of its own in the
+    /// legend where a curve has the same.
+    Area,
 }
 
 /// A shaded rectangle.

@@ -141,6 +141,7 @@ fn class(series: &Series, index: usize) -> String {
         Mark::Line | Mark::Step => "line",
         Mark::Dashed => "line dashed",
         Mark::Scatter => "dots",
+        Mark::Area => "area",
     };
     format!("{form} s{index}")
 }
@@ -195,8 +196,13 @@ impl Layout {
     fn entries(&self, chart: &Chart) -> Vec<Entry> {
         let all = || chart.panels.iter().flat_map(|panel| &panel.series);
         let series = self.series.iter().enumerate().filter_map(|(number, name)| {
-            let series = all().find(|series| series.name == *name)?;
-            let form = if series.mark == Mark::Scatter { Form::Dot } else { Form::Line };
+            let own = || all().filter(|series| series.name == *name);
+            let series = own().find(|series| series.mark != Mark::Area).or_else(|| own().next())?;
+            let form = match series.mark {
+                Mark::Scatter => Form::Dot,
+                Mark::Area => Form::Area,
+                _ => Form::Line,
+            };
             Some(Entry { name: name.clone(), class: class(series, number % COLOURS), form })
         });
         let limits = self.limits.iter().enumerate().map(|(number, name)| Entry {
@@ -298,6 +304,7 @@ impl Layout {
             Mark::Line | Mark::Dashed => polyline(&thin::line(points, 1.0)),
             Mark::Step => polyline(&thin::line(stairs(points), 1.0)),
             Mark::Scatter => dots(&thin::cloud(points, 2.0)),
+            Mark::Area => polyline(&thin::line(points, 1.0)) + "Z",
         };
         markup.leaf("path", &[("class", &class), ("d", &path)]);
     }

@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use super::experiment::Push;
+use super::experiment::{Experiment, Push};
 use super::ground::Ground;
 use super::plant::{Plant, Pose};
 use super::scenario::Scenario;
@@ -88,7 +88,8 @@ impl Scenario {
 
 impl Course {
     /// The course of a scenario on the ground.
-    pub(super) fn new(scenario: Scenario, seconds: f64, kick: &Push) -> Self {
+    pub(super) fn new(experiment: &Experiment) -> Self {
+        let Experiment { scenario, seconds, kick, torque_scale, .. } = experiment;
         let pitched = State { pitch_rad: LET_GO_PITCH_RAD, ..State::default() };
         let station = Self {
             initial: State::default(),
@@ -97,7 +98,7 @@ impl Course {
             push: None,
             ticks: (seconds / TICK_S).round() as usize,
         };
-        match scenario {
+        match *scenario {
             Scenario::Flat => Self { initial: pitched, ..station },
             Scenario::Kick => Self { initial: pitched, push: Some(*kick), ..station },
             Scenario::Bridge => Self {
@@ -107,11 +108,11 @@ impl Course {
                 ..station
             },
             Scenario::Cruise => {
-                let laps = OutAndBack::filling(seconds, CRUISE_LAP_S, CRUISE_PEAK_M_S);
+                let laps = OutAndBack::filling(*seconds, CRUISE_LAP_S, CRUISE_PEAK_M_S);
                 Self { motion: Motion::Laps(laps), ..station }
             }
             Scenario::Multisine => {
-                Self { motion: Motion::Torques(multisines(BALANCE_MULTISINE_NM)), ..station }
+                Self { motion: Motion::Torques(multisines(torque_scale * BALANCE_MULTISINE_NM)), ..station }
             }
             Scenario::Station | Scenario::SpeedTracking | Scenario::FrictionSweep => station,
         }

@@ -96,6 +96,14 @@ impl BenchPlant {
         Self { range_nm: Some(range_nm), phase, effects, ..self }
     }
 
+    /// The same at a time of its effects, s.
+    pub fn at_time(mut self, time_s: f64) -> Self {
+        if let Some(effects) = &mut self.effects {
+            effects.time_s = time_s;
+        }
+        self
+    }
+
     /// Angle, rad.
     pub fn angle_rad(&self) -> f64 {
         self.shaft.angle

@@ -22,6 +22,7 @@ use crate::model_file::{Model, Rig, RobotModel};
 use crate::parameter::{finite, not_negative, within};
 use crate::record::Log;
 use crate::record::{BenchSample, Sample};
+use crate::robot::Payload;
 
 /// Target of the speed tracking (section 4.3), rad/s.
 const TARGET_RAD_S: f64 = 5.0;
@@ -92,6 +93,12 @@ pub struct Experiment {
     pub gain: Option<Matrix2x4<f64>>,
     /// Height of the legs of both models in place of their own, m; the gain is designed for it.
     pub leg_height_m: Option<f64>,
+    /// Slope of the ground on top of the model's, upward in the direction of x, rad.
+    pub slope_rad: f64,
+    /// A load on the body in place of the model's, which the controller does not know of.
+    pub payload: Option<Payload>,
+    /// Torques of a multisine on the ground as a share of the usual ones.
+    pub torque_scale: f64,
 }
 
 /// Why an experiment has no outcome.
@@ -254,7 +261,7 @@ pub fn run(
     let ticks = (experiment.seconds / TICK_S).round() as usize;
     let outcome = match plan {
         Plan::Ground { controller, actual, .. } => {
-            let course = Course::new(experiment.scenario, experiment.seconds, &experiment.kick);
+            let course = Course::new(experiment);
             Outcome::Ground(course.run(&actual, controller, experiment.seed, warnings, watch)?)
         }
         Plan::Bench { control, fed, program, actual, .. } => {
@@ -300,6 +307,9 @@ impl Experiment {
             kick: Push::KICK,
             gain: None,
             leg_height_m: None,
+            slope_rad: 0.0,
+            payload: None,
+            torque_scale: 1.0,
         }
     }
 
@@ -330,6 +340,13 @@ impl Experiment {
         let ignored = [
             ("a gain", !self.on_ground() && self.gain.is_some(), ground),
             ("a height of the legs", !self.on_ground() && self.leg_height_m.is_some(), ground),
+            ("a slope", !self.on_ground() && self.slope_rad != 0.0, ground),
+            ("a payload", !self.on_ground() && self.payload.is_some(), ground),
+            (
+                "a scale of the torques",
+                !(self.on_ground() && self.scenario == Scenario::Multisine) && self.torque_scale != 1.0,
+                "the scenario multisine on the ground",
+            ),
             ("a pair of kp and ki", self.on_ground() && self.speed_gains.is_some(), "a scenario in the air"),
             ("a kick", self.scenario != Scenario::Kick && self.kick != default.kick, "the scenario kick"),
             (
@@ -360,6 +377,7 @@ impl Experiment {
             not_negative("kp", kp)?;
             not_negative("ki", ki)?;
         }
+        within("torque_scale", self.torque_scale, 0.0..=100.0, "from 0 to 100")?;
         within("start_s", self.kick.start_s, 0.0..=MAX_SECONDS, "from 0 to 3600")?;
         within("duration_s", self.kick.duration_s, 0.0..=MAX_SECONDS, "from 0 to 3600")?;
         finite("force_n", self.kick.force_n)?;
@@ -416,8 +434,11 @@ impl Plan {
     fn new(experiment: &Experiment, declared: &Model, actual: &Model) -> Result<Self, ExperimentError> {
         experiment.validate()?;
         if experiment.on_ground() {
-            let [declared, actual] =
+            let [declared, mut actual] =
                 [experiment.robot(declared)?, experiment.robot(actual).map_err(of_actual)?];
+            actual.surroundings.slope_rad += experiment.slope_rad;
+            actual.surroundings.payload = experiment.payload.or(actual.surroundings.payload);
+            actual.surroundings.validate()?;
             let gain = match experiment.gain {
                 Some(gain) => gain,
                 None => {

@@ -78,6 +78,17 @@ pub struct Pose {
     pub ground_height_m: [f64; 2],
 }
 
+/// A moment of a recorded motion.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Followed {
+    /// State along the path.
+    pub state: State,
+    /// Motor angles q, left and right, rad.
+    pub motor_angle_rad: [f64; 2],
+    /// Motor speeds, rad/s.
+    pub motor_speed_rad_s: [f64; 2],
+}
+
 impl Plant {
     /// A robot with its model's surroundings and effects, at `start` with heading 0 and no yaw rate. The model is
     /// taken as validated, with effects that are errors of declared numbers put into these.
@@ -111,6 +122,22 @@ impl Plant {
     pub(super) fn grounds_under<'a>(robot: &'a RobotModel, grounds: &'a [Ground; 2]) -> [&'a Ground; 2] {
         let own = &robot.surroundings.ground;
         [0, 1].map(|i: usize| if grounds[i].is_flat() { &own[i] } else { &grounds[i] })
+    }
+
+    /// Lets the effects see a recorded moment, so that those with a memory have it, and leaves the robot there.
+    pub fn follow(&mut self, recorded: &Followed, torque_nm: [f64; 2], dt_s: f64) {
+        let Some(mut effects) = self.effects.take() else { return };
+        self.let_go(recorded);
+        effects.act(self, torque_nm, dt_s);
+        self.effects = Some(effects);
+    }
+
+    /// Puts the robot into a recorded motion, its motors' angles apart as they were.
+    pub fn let_go(&mut self, recorded: &Followed) {
+        self.place(&recorded.state);
+        self.motion.angle = recorded.motor_angle_rad;
+        self.motion.speed = recorded.motor_speed_rad_s;
+        self.phases = [0, 1].map(|i: usize| self.shafts[i].phase_at(self.motion.speed[i]));
     }
 
     /// Moves on by `dt_s` in `substeps` equal steps of order 4. A torque or state that is not finite makes
