@@ -51,6 +51,78 @@ fn numbers(value: &Value) -> Vec<f64> {
     }
 }
 
+const DEMO_KEYS: [&str; 9] = [
+    "verdict",
+    "effects",
+    "before",
+    "after",
+    "unexplained",
+    "candidates",
+    "closed_loop",
+    "next_experiment",
+    "data_health",
+];
+
+/// The whole loop, twice: what scripts read, the report, and the same bytes for the same seed.
+#[test]
+fn demo_finds_what_was_hidden_and_says_the_same_again() {
+    let [report, model] = ["demo.html", "demo.toml"].map(|name| file(name, ""));
+    let arguments = ["demo", "--report", &report, "--out", &model, "--json"];
+    let first = flqr(&arguments);
+    assert_eq!(first.status.code(), Some(0), "{}", String::from_utf8_lossy(&first.stderr));
+    let (html, toml) = (std::fs::read(&report).unwrap(), std::fs::read_to_string(&model).unwrap());
+    let second = flqr(&arguments);
+    assert_eq!(first.stdout, second.stdout);
+    assert_eq!(html, std::fs::read(&report).unwrap());
+    let found: Value = serde_json::from_slice(&first.stdout).unwrap();
+    for key in DEMO_KEYS {
+        assert!(found.get(key).is_some(), "{key}");
+    }
+    assert_eq!(found["verdict"], "effects_found");
+    assert_eq!(found["truth"]["named"], true, "{found:#}");
+    let [before, after] =
+        ["before", "after"].map(|key| found[key]["rmse"]["combined"]["value"].as_f64().unwrap());
+    assert!(after < 0.7 * before, "{before} {after}");
+    assert_eq!(found["before"]["prediction"].as_array().unwrap().len(), 9);
+    assert!(found["closed_loop"]["scenarios"][0]["after"]["x_m"]["std"].is_f64());
+    assert!(toml.contains("[[effects]]"));
+    json(&["gains", &model]);
+}
+
+/// A run that is offered is one that can be started.
+#[test]
+fn experiments_that_are_offered_parse_and_run() {
+    let log = file("offered.csv", "");
+    for flags in [
+        "--scenario cruise --slope -0.05",
+        "--scenario multisine --torque-scale 2",
+        "--scenario multisine --payload 2",
+        "--scenario speed-tracking --controller pi --target-speed -1",
+    ] {
+        let words: Vec<&str> = flags.split(' ').collect();
+        let run = [&["simulate", PAPER, "--seconds", "2", "--log", &log][..], &words].concat();
+        assert_eq!(json(&run)["fell"], false, "{flags}");
+    }
+    refusal(&["simulate", PAPER, "--scenario", "cruise", "--torque-scale", "2"], 2);
+    refusal(&["simulate", PAPER, "--scenario", "friction-sweep", "--controller", "pi", "--slope", "0.1"], 2);
+}
+
+/// A log that cannot answer is told so before any effect, and what is no log of the machine is refused.
+#[test]
+fn refine_and_residual_of_logs_that_cannot_answer() {
+    let log = file("short.csv", "");
+    json(&["simulate", PAPER, "--scenario", "cruise", "--seconds", "4", "--log", &log]);
+    let found = json(&["refine", PAPER, &log]);
+    assert_eq!(found["verdict"], "data_unfit");
+    assert_eq!(found["effects"].as_array().unwrap().len(), 0);
+    assert!(found["next_experiment"]["summary"].is_string());
+    assert!(json(&["residual", PAPER, &log])["data_health"].is_array());
+    let pairs = file("pairs_of_refine.csv", "speed_rad_s,torque_nm\n1,0.1\n2,0.2\n");
+    assert!(refusal(&["refine", PAPER, &pairs], 1).contains("pairs"));
+    assert!(refusal(&["refine", PAPER, "absent.csv"], 1).contains("absent.csv"));
+    refusal(&["refine", PAPER], 2);
+}
+
 #[test]
 fn gains_of_the_papers_preset() {
     let gains = json(&["gains", PAPER]);

@@ -2,6 +2,7 @@
 
 mod controller;
 mod convert;
+mod demo;
 mod drive;
 mod emulate;
 mod export;
@@ -58,6 +59,8 @@ enum Command {
     Residual(residual::Arguments),
     /// Close the loop with measured data: find what the model lacks and add it
     Refine(refine::Arguments),
+    /// The whole loop in under a minute, without files or hardware: a simulated robot with a hidden effect
+    Demo(demo::Arguments),
     /// Run the simulated robot
     Simulate(simulate::Arguments),
     /// Every experiment of the paper on the simulated robot, ours beside theirs
@@ -94,6 +97,7 @@ pub(crate) fn run(cli: Cli) -> ExitCode {
         Some(Command::Fit(arguments)) => fit::run(&arguments, &output),
         Some(Command::Residual(arguments)) => residual::run(&arguments, &output),
         Some(Command::Refine(arguments)) => refine::run(&arguments, &output),
+        Some(Command::Demo(arguments)) => demo::run(&arguments, &output),
         Some(Command::Simulate(arguments)) => simulate::run(&arguments, &output),
         Some(Command::Reproduce(arguments)) => reproduce::run(&arguments, &output),
         Some(Command::Emulate(arguments)) => emulate::run(&arguments, &output),

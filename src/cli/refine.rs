@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use clap::Args;
-use flqr_core::refine::{self, Fate, Refinement, Verdict};
+use flqr_core::refine::{self, ClosedLoop, Fate, LoopRun, Options, Refinement, Verdict};
 
 use super::output::{Failure, Output, complain, number};
 use super::progress::Progress;
@@ -37,7 +37,9 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let logs = arguments.common.read(&arguments.logs)?;
     let held_out = arguments.common.read(&arguments.heldout)?;
     let bar = Progress::new("refine");
-    let found = refine::refine(&model, &logs, &held_out, &arguments.common.options(), &mut |share| {
+    let file = arguments.out.as_ref().unwrap_or(&arguments.model).display().to_string();
+    let options = Options { model_file: file, ..arguments.common.options() };
+    let found = refine::refine(&model, &logs, &held_out, &options, &mut |share| {
         bar.set((1000.0 * share) as u64, 1000);
         ControlFlow::Continue(())
     })
@@ -57,7 +59,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
 /// Most lines about what was tried and not added.
 const MOST_LOST: usize = 8;
 
-fn print(out: &mut dyn Write, found: &Refinement) -> io::Result<()> {
+pub(crate) fn print(out: &mut dyn Write, found: &Refinement) -> io::Result<()> {
     let verdict = match found.verdict {
         Verdict::ModelAdequate => "model adequate: no effect of the library explains the log better",
         Verdict::EffectsFound => "effects found",
@@ -93,8 +95,42 @@ fn print(out: &mut dyn Write, found: &Refinement) -> io::Result<()> {
     if !found.unexplained.description.is_empty() {
         writeln!(out, "unexplained: {}", found.unexplained.description)?;
     }
+    if let Some(closed_loop) = &found.closed_loop {
+        print_closed_loop(out, closed_loop)?;
+    }
     if let Some(next) = &found.next_experiment {
         writeln!(out, "next experiment: {}", next.summary)?;
+        if let Some(command) = &next.command {
+            writeln!(out, "  {command}")?;
+        }
     }
     print_health(out, &found.data_health)
+}
+
+/// The simulated robot under both controllers, and what becomes of each effect.
+fn print_closed_loop(out: &mut dyn Write, closed_loop: &ClosedLoop) -> io::Result<()> {
+    writeln!(out, "\n{:45}{:>14}{:>14}", "simulated, standard deviations", "before", "after")?;
+    for pair in &closed_loop.scenarios {
+        let rows = [
+            ("x", pair.before.x_m.std, pair.after.x_m.std, "m"),
+            ("x_dot", pair.before.x_dot_m_s.std, pair.after.x_dot_m_s.std, "m/s"),
+            ("pitch", pair.before.pitch_rad.std, pair.after.pitch_rad.std, "rad"),
+        ];
+        for (name, before, after, unit) in rows {
+            let what = format!("{}, {name}", pair.scenario);
+            writeln!(out, "{what:45}{:>14}{:>14} {unit}", number(before), number(after))?;
+        }
+        let cycle = |run: &LoopRun| match (run.fell, run.limit_cycle) {
+            (true, _) => "fell".to_owned(),
+            (_, Some(cycle)) => format!("{:.1} mm, {:.2} Hz", 1e3 * cycle.amplitude_m, cycle.frequency_hz),
+            (_, None) => "none".to_owned(),
+        };
+        let what = format!("{}, limit cycle", pair.scenario);
+        writeln!(out, "{what:40}{:>19}{:>19}", cycle(&pair.before), cycle(&pair.after))?;
+    }
+    for fed in &closed_loop.feedforward {
+        let used = if fed.used { "used" } else { "not used" };
+        writeln!(out, "{} in the controller: {used}: {}", fed.effect.id, fed.reason)?;
+    }
+    writeln!(out)
 }

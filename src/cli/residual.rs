@@ -4,12 +4,11 @@ use std::io::{self, Write};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use flqr_core::record::{ColumnMap, HealthFinding, Log, Mapping};
 use flqr_core::refine::{self, Errors, Options, Residual};
-use flqr_core::robot::Motor;
 
-use super::input;
+use super::input::{self, MotorName};
 use super::output::{Failure, Output, number};
 use super::progress::Progress;
 
@@ -41,19 +40,14 @@ pub(crate) struct Common {
     seed: u64,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-enum MotorName {
-    Left,
-    Right,
-}
-
 impl Common {
     pub(crate) fn options(&self) -> Options {
-        let motor = match self.motor {
-            MotorName::Left => Motor::Left,
-            MotorName::Right => Motor::Right,
-        };
-        Options { motor, estimate: self.estimate.clone(), seed: self.seed }
+        Options {
+            motor: self.motor.into(),
+            estimate: self.estimate.clone(),
+            seed: self.seed,
+            ..Options::default()
+        }
     }
 
     pub(crate) fn read(&self, paths: &[PathBuf]) -> Result<Vec<Log>, Failure> {
@@ -111,6 +105,22 @@ pub(crate) fn print_errors(out: &mut dyn Write, errors: &[(&str, &Errors)]) -> i
             }
             writeln!(out, " {}", if quantity.unit == "1" { "" } else { quantity.unit })?;
         }
+    }
+    print_predictions(out, errors)
+}
+
+/// Errors of short predictions, with the noise and the motion itself beside them.
+fn print_predictions(out: &mut dyn Write, errors: &[(&str, &Errors)]) -> io::Result<()> {
+    let Some((_, first)) = errors.first() else { return Ok(()) };
+    for (index, prediction) in first.prediction.iter().enumerate() {
+        let what = format!("prediction {:.0} ms ahead, {}", 1e3 * prediction.horizon_s, prediction.variable);
+        write!(out, "{what:45}")?;
+        for (_, errors) in errors {
+            let own = errors.prediction.get(index);
+            write!(out, "{:>14}", own.map_or(String::new(), |own| number(own.rmse.value)))?;
+        }
+        let (noise, motion) = (number(prediction.noise_floor.value), number(prediction.motion.value));
+        writeln!(out, " {} (noise {noise}, motion {motion})", prediction.rmse.unit)?;
     }
     Ok(())
 }

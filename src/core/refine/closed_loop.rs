@@ -1,8 +1,20 @@
 //! The refined model as the plant: what the controller of before and the one made from the refined model do with it.
+//!
+//! An effect that a controller could cancel is offered to it only if the simulated loop stays as calm with it as without:
+//! over seeds, with a payload, with a longer delay, and where the effect is smaller than it was estimated. Otherwise the
+//! refined model carries it with `feedforward = false`: the simulator has it, the controller leaves it.
+
+use std::f64::consts::TAU;
+use std::num::NonZeroUsize;
+use std::ops::ControlFlow;
 
 use serde::Serialize;
 
-use crate::effects::EffectKind;
+use crate::effects::{Effect, EffectKind, Feedforward, MachineKind, Role};
+use crate::model_file::{Model, Rig, RobotModel};
+use crate::parallel;
+use crate::robot::RobotParameters;
+use crate::simulate::{self, ControllerChoice, Experiment, Outcome, Run, Scenario, TimedPose};
 
 /// Runs of the simulated robot with the refined model as the plant: the controller of before and the one made from the
 /// refined model.
@@ -54,7 +66,7 @@ pub struct Spread {
 /// A periodic motion of the robot.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct LimitCycle {
-    /// Half of the peak to peak of x at its frequency, m.
+    /// Amplitude of x at its frequency, m.
     pub amplitude_m: f64,
     /// Its frequency, Hz.
     pub frequency_hz: f64,
@@ -74,4 +86,362 @@ pub struct Fed {
 
 fn id<S: serde::Serializer>(kind: &&'static EffectKind, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_str(kind.id)
+}
+
+/// Length of a run and where its statistics begin, s.
+const SECONDS: f64 = 20.0;
+const FROM_S: f64 = 5.0;
+/// The same of the runs that check a feedforward.
+const CHECK_SECONDS: f64 = 8.0;
+const CHECK_FROM_S: f64 = 2.0;
+/// Variations of those runs: payload as a share of the body, longer delay, s, and smaller effect.
+const PAYLOAD: f64 = 0.1;
+const LATER_S: f64 = 0.002;
+const SMALLER: f64 = 0.85;
+/// Share of the power of the wheels' way that a limit cycle has about one frequency, and its least amplitude, m.
+const PERIODIC: f64 = 0.5;
+const LEAST_CYCLE_M: f64 = 5e-4;
+/// How many times more a loop may swing with a feedforward than without, and by how much in any case, m and rad/s.
+const CALM: f64 = 1.25;
+const STILL_M: f64 = 5e-4;
+const STILL_RAD_S: f64 = 0.05;
+
+/// Simulates the refined model under the controllers of before and after, and marks in it the effects that a controller
+/// must leave. None where no robot can be simulated, or nothing was found.
+pub(super) fn closed_loop(
+    declared: &Model,
+    refined: &mut Model,
+    kinds: &[&'static EffectKind],
+    seed: u64,
+) -> Option<ClosedLoop> {
+    let weighted = |model: &Model| model.robot().is_some_and(|robot| robot.weights.is_some());
+    if kinds.is_empty() || !weighted(declared) || !weighted(refined) {
+        return None;
+    }
+    let feedforward = offered(refined, kinds, seed)?;
+    let actual = &*refined;
+    let scenarios = [Scenario::Station, Scenario::Multisine];
+    let jobs: Vec<(Scenario, &Model)> =
+        scenarios.iter().flat_map(|&scenario| [(scenario, declared), (scenario, actual)]).collect();
+    let runs = parallel::map(&jobs, threads(), |(scenario, controller)| {
+        let run = ground_run(*scenario, controller, actual, SECONDS, seed)?;
+        Some(told(&run, actual.robot()?, *scenario, FROM_S))
+    });
+    let mut runs = runs.into_iter();
+    let mut pairs = Vec::new();
+    for scenario in scenarios {
+        let (before, after) = (runs.next()??, runs.next()??);
+        pairs.push(LoopPair { scenario: scenario.name().to_owned(), before, after });
+    }
+    Some(ClosedLoop { scenarios: pairs, feedforward })
+}
+
+fn threads() -> NonZeroUsize {
+    NonZeroUsize::new(2).expect("2 is not 0")
+}
+
+fn ground_run(
+    scenario: Scenario,
+    controller: &Model,
+    actual: &Model,
+    seconds: f64,
+    seed: u64,
+) -> Option<Run> {
+    let own = controller.robot()?;
+    let fed = own.friction.iter().any(Option::is_some) || own.effects.iter().any(Effect::is_fed_forward);
+    let choice = if fed { ControllerChoice::Flqr } else { ControllerChoice::Lqr };
+    let experiment = Experiment { seconds, seed, ..Experiment::new(scenario, choice) };
+    match simulate::run(&experiment, controller, actual, &mut |_| ControlFlow::Continue(())) {
+        Ok(Outcome::Ground(run)) => Some(run),
+        _ => None,
+    }
+}
+
+fn told(run: &Run, robot: &RobotModel, scenario: Scenario, from_s: f64) -> LoopRun {
+    let poses = counted(run, from_s);
+    let spread = |of: &dyn Fn(&TimedPose) -> f64| {
+        let values: Vec<f64> = poses.iter().map(of).collect();
+        spread(&values)
+    };
+    let cycle = if scenario == Scenario::Station { cycle(poses, &robot.parameters) } else { None };
+    LoopRun {
+        x_m: spread(&|p| p.pose.state.x_m),
+        x_dot_m_s: spread(&|p| p.pose.state.x_dot_m_s),
+        pitch_rad: spread(&|p| p.pose.state.pitch_rad),
+        limit_cycle: cycle,
+        fell: run.statistics.fell,
+    }
+}
+
+/// The poses that count; all of a run that fell before.
+fn counted(run: &Run, from_s: f64) -> &[TimedPose] {
+    let first = run.poses.partition_point(|pose| pose.time_s < from_s);
+    if first + 2 < run.poses.len() { &run.poses[first..] } else { &run.poses }
+}
+
+fn spread(values: &[f64]) -> Spread {
+    let count = values.len().max(1) as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let variance = values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / count;
+    let (low, high) =
+        values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)));
+    Spread { mean, std: variance.sqrt(), peak_to_peak: (high - low).max(0.0) }
+}
+
+/// A motion of which most is about one frequency.
+fn cycle(poses: &[TimedPose], p: &RobotParameters) -> Option<LimitCycle> {
+    let seconds = poses.last()?.time_s - poses.first()?.time_s;
+    let x: Vec<f64> = poses.iter().map(|pose| pose.pose.state.x_m).collect();
+    let way: Vec<f64> =
+        poses.iter().map(|pose| pose.pose.state.x_m - p.wheel_radius_m * pose.pose.state.pitch_rad).collect();
+    let (x, way) = (level(&x), level(&way));
+    let total = 2.0 * way.iter().map(|v| v * v).sum::<f64>() / way.len() as f64;
+    // Squares of the amplitudes at the multiples of one wave in the run, up to 20 Hz.
+    let most = ((20.0 * seconds) as usize).min(way.len() / 2);
+    let powers: Vec<f64> = (1..most).map(|waves| wave(&way, waves).powi(2)).collect();
+    let strongest = (0..powers.len()).max_by(|&a, &b| powers[a].total_cmp(&powers[b]))?;
+    let near = strongest.saturating_sub(1)..(strongest + 2).min(powers.len());
+    let band: f64 = powers[near.clone()].iter().sum();
+    if band < PERIODIC * total || band.sqrt() < LEAST_CYCLE_M {
+        return None;
+    }
+    let centre: f64 = near.clone().map(|place| powers[place] * (place + 1) as f64).sum::<f64>() / band;
+    let amplitude: f64 = near.map(|place| wave(&x, place + 1).powi(2)).sum::<f64>();
+    Some(LimitCycle { amplitude_m: amplitude.sqrt(), frequency_hz: centre / seconds })
+}
+
+/// Without its straight line.
+fn level(values: &[f64]) -> Vec<f64> {
+    let count = values.len() as f64;
+    let middle = 0.5 * (count - 1.0);
+    let mean = values.iter().sum::<f64>() / count;
+    let (mut product, mut square) = (0.0, 0.0);
+    for (i, value) in values.iter().enumerate() {
+        let t = i as f64 - middle;
+        product += t * value;
+        square += t * t;
+    }
+    let slope = product / square.max(1.0);
+    values.iter().enumerate().map(|(i, value)| value - mean - slope * (i as f64 - middle)).collect()
+}
+
+/// Amplitude of a whole number of waves.
+fn wave(values: &[f64], waves: usize) -> f64 {
+    let (turn_sin, turn_cos) = libm::sincos(TAU * waves as f64 / values.len() as f64);
+    let (mut sin, mut cos, mut re, mut im) = (0.0, 1.0, 0.0, 0.0);
+    for value in values {
+        re += value * cos;
+        im += value * sin;
+        (sin, cos) = (sin * turn_cos + cos * turn_sin, cos * turn_cos - sin * turn_sin);
+    }
+    2.0 * re.hypot(im) / values.len() as f64
+}
+
+/// What becomes of each effect; those that are not offered are marked in the model.
+fn offered(refined: &mut Model, kinds: &[&'static EffectKind], seed: u64) -> Option<Vec<Fed>> {
+    let Rig::Robot(robot) = &refined.rig else { return None };
+    let able: Vec<usize> =
+        (0..robot.effects.len()).filter(|&place| robot.effects[place].is_fed_forward()).collect();
+    let mut verdicts: Vec<Result<String, String>> = Vec::new();
+    let together = trial(refined, &able, &able, seed);
+    for &place in &able {
+        verdicts.push(match &together {
+            Ok(reason) => Ok(reason.clone()),
+            Err(_) => trial(refined, &able, &[place], seed),
+        });
+    }
+    // What passes alone must also pass with the others.
+    let passed: Vec<usize> =
+        able.iter().zip(&verdicts).filter(|(_, verdict)| verdict.is_ok()).map(|(place, _)| *place).collect();
+    if together.is_err()
+        && passed.len() > 1
+        && let Err(reason) = trial(refined, &able, &passed, seed)
+    {
+        verdicts.iter_mut().for_each(|verdict| *verdict = Err(reason.clone()));
+    }
+    let mut told = Vec::new();
+    for &kind in kinds {
+        let own = able.iter().position(|&place| robot.effects[place].kind() == kind);
+        let (used, reason) = match (own.map(|own| &verdicts[own]), kind.feedforward) {
+            (Some(Ok(reason)), _) if kind.by_angle() => (true, format!("{reason}; {ARMED}")),
+            (Some(Ok(reason)), _) => (true, reason.clone()),
+            (Some(Err(reason)), _) => (false, reason.clone()),
+            (None, Feedforward::Never(reason)) => (false, reason.to_owned()),
+            (None, _) => {
+                (true, "put right in the declared numbers that the controller is made from".to_owned())
+            }
+        };
+        told.push(Fed { effect: kind, used, reason });
+    }
+    let refused: Vec<usize> =
+        able.iter().zip(&verdicts).filter(|(_, verdict)| verdict.is_err()).map(|(place, _)| *place).collect();
+    keep_from(refined, &refused);
+    Some(told)
+}
+
+/// Why a driven robot does without.
+const ARMED: &str = "a driven robot leaves it out, as its motors' angles count from where they were armed";
+
+/// Marks effects that no controller may cancel.
+fn keep_from(model: &mut Model, places: &[usize]) {
+    let Rig::Robot(robot) = &mut model.rig else { return };
+    for &place in places {
+        if let Ok(left) = robot.effects[place].clone().with_feedforward(false) {
+            robot.effects[place] = left;
+        }
+    }
+}
+
+/// Whether the loop stays as calm with the feedforward of some of the effects as without any, and how calm it is.
+fn trial(refined: &Model, able: &[usize], fed: &[usize], seed: u64) -> Result<String, String> {
+    let mut none = refined.clone();
+    keep_from(&mut none, able);
+    let mut some = refined.clone();
+    let others: Vec<usize> = able.iter().copied().filter(|place| !fed.contains(place)).collect();
+    keep_from(&mut some, &others);
+    let plants = variations(refined, fed);
+    let jobs: Vec<(usize, &Model)> = (0..plants.len()).flat_map(|n| [(n, &none), (n, &some)]).collect();
+    let runs = parallel::map(&jobs, threads(), |(n, controller)| {
+        ground_run(Scenario::Station, controller, &plants[*n].1, CHECK_SECONDS, seed + *n as u64)
+    });
+    let (mut swing, mut worst) = ([0.0; 2], None);
+    for (n, pair) in runs.chunks(2).enumerate() {
+        let [Some(without), Some(with)] = pair else {
+            return Err("left out: its loop could not be simulated".to_owned());
+        };
+        let Some(robot) = plants[n].1.robot() else { continue };
+        let calm = |run: &Run| {
+            let poses = counted(run, CHECK_FROM_S);
+            let speeds: Vec<f64> =
+                poses.iter().map(|pose| robot.parameters.motor_speed_rad_s(&pose.pose.state)).collect();
+            (spread(&speeds).std, cycle(poses, &robot.parameters).map_or(0.0, |cycle| cycle.amplitude_m))
+        };
+        let ((speed_without, cycle_without), (speed_with, cycle_with)) = (calm(without), calm(with));
+        swing[0] += speed_without / plants.len() as f64;
+        swing[1] += speed_with / plants.len() as f64;
+        let falls = with.statistics.fell && !without.statistics.fell;
+        let cycles = cycle_with > CALM * cycle_without + STILL_M;
+        if falls || cycles || speed_with > CALM * speed_without + STILL_RAD_S {
+            let what = if falls {
+                "the simulated robot falls".to_owned()
+            } else if cycles {
+                format!("the simulated loop swings by itself by {:.1} mm", 1e3 * cycle_with)
+            } else {
+                format!("the motors' speed wanders by {speed_with:.2} in place of {speed_without:.2} rad/s")
+            };
+            worst = worst.or(Some(format!("left out: with it and {}, {what}", plants[n].0)));
+        }
+    }
+    match worst {
+        Some(reason) => Err(reason),
+        None => Ok(format!(
+            "cancelled by the controller; the simulated motors' speed wanders by {:.3} rad/s without and {:.3} with it",
+            swing[0], swing[1]
+        )),
+    }
+}
+
+/// Plants that a feedforward has to serve.
+fn variations(refined: &Model, fed: &[usize]) -> Vec<(&'static str, Model)> {
+    let changed = |change: &dyn Fn(&mut RobotModel)| {
+        let mut model = refined.clone();
+        if let Rig::Robot(robot) = &mut model.rig {
+            change(robot);
+        }
+        model
+    };
+    let payload = changed(&|robot| {
+        let p = robot.parameters;
+        robot.set_parameters(RobotParameters { body_mass_kg: (1.0 + PAYLOAD) * p.body_mass_kg, ..p });
+    });
+    let later = changed(&|robot| robot.actuation.delay_s += LATER_S);
+    let smaller = changed(&|robot| {
+        for &place in fed {
+            if let Some(effect) = scaled(&robot.effects[place], SMALLER) {
+                robot.effects[place] = effect;
+            }
+        }
+    });
+    vec![
+        ("the model as it is", refined.clone()),
+        ("a payload of a tenth of the body", payload),
+        ("a delay that is 2 ms longer", later),
+        ("an effect that is 15 % smaller", smaller),
+    ]
+}
+
+/// The same effect of another size.
+pub(super) fn scaled(effect: &Effect, share: f64) -> Option<Effect> {
+    let own = effect.kind().parameters;
+    let sized = effect.parameters().iter().enumerate().map(|(n, (key, value))| {
+        let amplitude = own[n % own.len()].role == Role::Amplitude;
+        (key.as_str(), if amplitude { share * value } else { *value })
+    });
+    Effect::new(effect.id(), MachineKind::Robot, effect.motor(), sized).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model_file::presets;
+    use crate::simulate::Pose;
+
+    fn with_cogging(size_nm: f64) -> Model {
+        let mut model = presets::paper();
+        let Rig::Robot(robot) = &mut model.rig else { unreachable!() };
+        let parameters = [("order_1", 7.0), ("cos_1_nm", size_nm), ("sin_1_nm", 0.0)];
+        robot.effects.push(Effect::new("cogging", MachineKind::Robot, None, parameters).unwrap());
+        model
+    }
+
+    #[test]
+    fn a_swing_is_told_with_its_frequency_and_amplitude_and_noise_is_none() {
+        let at = |tick: usize, x_m: f64| {
+            let state = crate::robot::State { x_m, ..Default::default() };
+            TimedPose { time_s: 0.01 * tick as f64, pose: Pose { state, ..Pose::default() } }
+        };
+        let p = presets::paper().robot().unwrap().parameters;
+        let swings: Vec<TimedPose> = (0..1500)
+            .map(|i| at(i, 0.02 * f64::sin(TAU * 0.43 * 0.01 * i as f64) + 1e-4 * i as f64))
+            .collect();
+        let found = cycle(&swings, &p).unwrap();
+        assert!(
+            (found.frequency_hz - 0.43).abs() < 0.015 && (found.amplitude_m - 0.02).abs() < 2e-3,
+            "{found:?}"
+        );
+        let mut noise = simulate::Noise::new(3, 0);
+        let rough: Vec<TimedPose> = (0..1500).map(|i| at(i, noise.normal(0.01))).collect();
+        assert_eq!(cycle(&rough, &p), None);
+    }
+
+    #[test]
+    fn cogging_is_cancelled_and_the_loop_gets_calmer() {
+        let declared = presets::paper();
+        let mut refined = with_cogging(0.05);
+        let kinds = [crate::effects::kind("cogging").unwrap()];
+        let found = closed_loop(&declared, &mut refined, &kinds, 1).unwrap();
+        assert!(found.feedforward[0].used, "{found:?}");
+        assert!(refined.robot().unwrap().effects[0].is_fed_forward());
+        let station = &found.scenarios[0];
+        assert!(station.after.x_m.std < station.before.x_m.std, "{station:?}");
+    }
+
+    /// Dry friction estimated far too high, fed forward, drives the motors by itself.
+    #[test]
+    fn friction_that_would_drive_the_robot_is_left_out_and_marked() {
+        let mut refined = presets::paper();
+        let Rig::Robot(robot) = &mut refined.rig else { unreachable!() };
+        let gain = Effect::new("torque_gain", MachineKind::Robot, None, [("gain", -0.7)]).unwrap();
+        robot.effects.push(gain);
+        let declared = presets::paper();
+        let kinds =
+            [crate::effects::kind("torque_gain").unwrap(), crate::effects::kind("aero_drag").unwrap()];
+        let found = closed_loop(&declared, &mut refined, &kinds, 1).unwrap();
+        let robot = refined.robot().unwrap();
+        assert_eq!(found.feedforward[0].used, robot.effects[0].is_fed_forward());
+        assert!(!found.feedforward[1].used && found.feedforward[1].reason.contains("lean"));
+        let text = refined.to_toml();
+        assert_eq!(text.contains("feedforward = false"), !robot.effects[0].is_fed_forward());
+        assert_eq!(Model::from_toml(&text, "again").unwrap(), refined);
+    }
 }

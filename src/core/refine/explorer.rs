@@ -2,6 +2,8 @@
 
 use std::f64::consts::TAU;
 
+use crate::identify::quantile::student_t_975;
+
 /// The main channel of a log over everything that it may depend on.
 ///
 /// Residuals are what was measured less what the model asks for at that row.
@@ -42,6 +44,8 @@ pub struct Variable {
 const MOST: usize = 4000;
 /// Highest order of the spectrum.
 const HIGHEST_ORDER: usize = 160;
+/// Blocks of an interval.
+const BLOCKS: usize = 12;
 /// Fewest rows in a wave of an order, on the average, for it to be told.
 const ROWS_A_WAVE: f64 = 2.2;
 
@@ -72,6 +76,25 @@ impl Explorer {
         self.held_out = self.held_out.iter().copied().step_by(step).collect();
         self
     }
+}
+
+/// 95 % interval of the root mean square of a residual on the held-out rows, by blocks of these; none where they are too
+/// few.
+pub(super) fn interval(residual: &[f64], held_out: &[bool]) -> Option<[f64; 2]> {
+    let held = residual.iter().zip(held_out).filter(|(_, held)| **held).map(|(value, _)| value * value);
+    let squares: Vec<f64> = held.collect();
+    if squares.len() < 10 * BLOCKS {
+        return None;
+    }
+    let block = |number: usize| {
+        let rows = &squares[number * squares.len() / BLOCKS..(number + 1) * squares.len() / BLOCKS];
+        rows.iter().sum::<f64>() / rows.len() as f64
+    };
+    let means: Vec<f64> = (0..BLOCKS).map(block).collect();
+    let mean = means.iter().sum::<f64>() / BLOCKS as f64;
+    let variance = means.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (BLOCKS - 1) as f64;
+    let half = student_t_975(BLOCKS - 1) * (variance / BLOCKS as f64).sqrt();
+    Some([mean - half, mean + half].map(|square| square.max(0.0).sqrt()))
 }
 
 /// Amplitudes of the orders of an angle, every stretch of it of the same weight however fast it was passed.

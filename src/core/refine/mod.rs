@@ -16,10 +16,13 @@
 
 mod axis;
 mod closed_loop;
+mod demo;
 mod error;
 mod explorer;
 mod next_experiment;
 mod pages;
+mod pictures;
+mod prediction;
 mod robot;
 pub mod select;
 mod verdict;
@@ -32,9 +35,12 @@ use crate::record::{Log, LogKind};
 use crate::robot::Motor;
 
 pub use closed_loop::{ClosedLoop, Fed, LimitCycle, LoopPair, LoopRun, Spread};
+pub use demo::{Demonstration, DemonstrationError, Truth, demonstrate};
 pub use error::RefineError;
 pub use explorer::{Explorer, Variable};
+use next_experiment::Asked;
 pub use next_experiment::NextExperiment;
+use prediction::{Rows, predictions};
 pub use verdict::{
     Channels, Corrected, Errors, Fate, Found, Prediction, Quantity, Refinement, Residual, Sized, Test, Tried,
     Unexplained, Verdict,
@@ -50,6 +56,8 @@ pub struct Options {
     pub estimate: Vec<String>,
     /// Seed of everything that is drawn.
     pub seed: u64,
+    /// Name of the file that the refined model will have, for the commands of an answer; empty for a word in its place.
+    pub model_file: String,
 }
 
 /// How far a model is from logs of its machine.
@@ -62,10 +70,14 @@ pub fn residual(
     options: &Options,
     watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<Residual, RefineError> {
-    match kind_of(model, logs)? {
+    let mut found = match kind_of(model, logs)? {
         LogKind::Robot => robot::residual(model, logs, options, watch),
         _ => axis::residual(model, logs, options, watch),
+    }?;
+    if !found.errors.rmse.0.is_empty() {
+        found.errors.prediction = predictions(model, logs, Rows::All, options.motor, options.seed);
     }
+    Ok(found)
 }
 
 /// Finds what a model lacks, and adds it. Without `held_out` logs the last third of each log is held out, after a gap
@@ -92,7 +104,21 @@ pub fn refine(
         _ => axis::refine(model, logs, held_out, options, watch),
     }?;
     if found.verdict != Verdict::DataUnfit {
-        found.next_experiment = next_experiment::in_words(&found.effects, &found.unexplained);
+        let kinds: Vec<_> = found.effects.iter().map(|effect| effect.effect.kind()).collect();
+        found.closed_loop = closed_loop::closed_loop(model, &mut found.model, &kinds, options.seed);
+        let (told, rows) = if held_out.is_empty() { (logs, Rows::LastThird) } else { (held_out, Rows::All) };
+        let predicted = |model: &Model| predictions(model, told, rows, options.motor, options.seed);
+        found.before.prediction = predicted(model);
+        found.after.prediction =
+            if found.model == *model { found.before.prediction.clone() } else { predicted(&found.model) };
+        let asked = Asked { logs, motor: options.motor, seed: options.seed, file: &options.model_file };
+        found.next_experiment = next_experiment::next_experiment(&found, &asked);
+    }
+    let (explorer, held) = (&found.explorer, &found.explorer.held_out);
+    for (errors, residual) in [(&mut found.before, &explorer.before), (&mut found.after, &explorer.after)] {
+        if let Some((_, main)) = errors.rmse.0.first_mut() {
+            main.ci95 = explorer::interval(residual, held);
+        }
     }
     found.document = pages::document(&found, logs);
     Ok(found)

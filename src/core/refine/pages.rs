@@ -1,51 +1,41 @@
-//! The report of a refinement: what was found, errors before and after, and the residual as pictures.
+//! The report of a refinement: the data's health, the residual before, what was found and what lost, errors before and
+//! after, the closed loop, what remains, and what to record next.
 
 use crate::record::{Log, Severity};
-use crate::report::{Axis, Block, Cell, Chart, Column, Document, Mark, Panel, Series, Table, Tone};
+use crate::report::{Block, Cell, Column, Document, Table, Tone};
 
-use super::explorer::{Explorer, Variable};
-use super::verdict::{Errors, Refinement, Verdict};
+use super::closed_loop::{ClosedLoop, LoopRun};
+use super::pictures;
+use super::verdict::{Errors, Fate, Found, Prediction, Quantity, Refinement, Verdict};
 
-/// Bins of the pictures over a variable.
-const BINS: usize = 90;
+/// Most rows of what was tried.
+const MOST_TRIED: usize = 16;
 
 /// The report.
 pub(super) fn document(found: &Refinement, logs: &[Log]) -> Document {
     let mut blocks = vec![verdict(found)];
-    blocks.push(Block::section("Effects"));
-    if found.effects.is_empty() {
-        blocks.push(Block::paragraph("No effect of the library is named."));
-    } else {
+    if !found.effects.is_empty() {
         blocks.push(Block::Table(effects(found)));
-        for effect in &found.effects {
-            blocks.push(Block::paragraph(format!(
-                "{}: {}.",
-                effect.effect.id(),
-                effect.effect.kind().summary
-            )));
-        }
-    }
-    if !found.unexplained.description.is_empty() {
-        blocks.push(Block::notice(Tone::Warning, "Unexplained", found.unexplained.description.clone()));
     }
     if let Some(next) = &found.next_experiment {
         blocks.push(Block::notice(Tone::Note, "Next experiment", next.summary.clone()));
     }
-    blocks.push(Block::section("Error before and after"));
-    blocks.push(Block::Table(errors(found)));
-    blocks.extend(pictures(&found.explorer).into_iter().map(Block::Figure));
-    blocks.push(Block::section("Declared numbers as this log has them"));
-    blocks.push(Block::Table(parameters(found)));
-    blocks.push(Block::section("Data"));
-    blocks.push(Block::List { numbered: false, items: logs.iter().map(|log| log.source.clone()).collect() });
-    for finding in &found.data_health {
-        let (tone, label) = match finding.severity {
-            Severity::Info => continue,
-            Severity::Warning => (Tone::Note, "Warning"),
-            Severity::Error => (Tone::Warning, "Error"),
-        };
-        let text = format!("{}: {}; {}", finding.column, finding.problem, finding.mend);
-        blocks.push(Block::notice(tone, label, text));
+    health(found, logs, &mut blocks);
+    if found.verdict != Verdict::DataUnfit {
+        blocks.push(Block::section("The residual"));
+        blocks.extend(pictures::in_time(&found.explorer).map(Block::Figure));
+        evidence(found, &mut blocks);
+        blocks.push(Block::section("Error before and after"));
+        blocks.push(Block::Table(errors(found)));
+        if !found.before.prediction.is_empty() {
+            blocks.push(Block::Table(predictions(found)));
+        }
+        if let Some(closed_loop) = &found.closed_loop {
+            simulated(closed_loop, &mut blocks);
+        }
+        remains(found, &mut blocks);
+        blocks.push(Block::section("Declared numbers as this log has them"));
+        blocks.push(Block::Table(parameters(found)));
     }
     let summary = format!(
         "What the logs say about the model {}: its residual, the effects that it lacks, and the error on rows that took no \
@@ -65,7 +55,7 @@ fn verdict(found: &Refinement) -> Block {
         Verdict::EffectsFound => Block::notice(
             Tone::Good,
             "Effects found",
-            found.effects.iter().map(|effect| effect.effect.id()).collect::<Vec<_>>().join(", "),
+            found.effects.iter().map(said).collect::<Vec<_>>().join("; "),
         ),
         Verdict::UnexplainedResidual => Block::notice(
             Tone::Warning,
@@ -75,6 +65,110 @@ fn verdict(found: &Refinement) -> Block {
         Verdict::DataUnfit => {
             Block::notice(Tone::Warning, "Data unfit", "the logs cannot answer; the reasons stand below")
         }
+    }
+}
+
+fn said(found: &Found) -> String {
+    format!(
+        "{} ({}), error lower by {:.1} %",
+        found.effect.id(),
+        found.effect.kind().summary,
+        found.error_drop_percent
+    )
+}
+
+fn health(found: &Refinement, logs: &[Log], blocks: &mut Vec<Block>) {
+    blocks.push(Block::section("Health of the data"));
+    blocks.push(Block::List { numbered: false, items: logs.iter().map(|log| log.source.clone()).collect() });
+    let mut told: Vec<(&str, Vec<&str>)> = Vec::new();
+    for finding in &found.data_health {
+        let text = format!("{}: {}; {}", finding.column, finding.problem, finding.mend);
+        match finding.severity {
+            Severity::Info => {
+                let place =
+                    told.iter().position(|(column, _)| *column == finding.column).unwrap_or(told.len());
+                if place == told.len() {
+                    told.push((&finding.column, Vec::new()));
+                }
+                if !told[place].1.contains(&finding.problem.as_str()) {
+                    told[place].1.push(&finding.problem);
+                }
+            }
+            Severity::Warning => blocks.push(Block::notice(Tone::Note, "Warning", text)),
+            Severity::Error => blocks.push(Block::notice(Tone::Warning, "Error", text)),
+        }
+    }
+    if !told.is_empty() {
+        blocks.push(Block::Table(Table {
+            caption: "Rates, steps and held samples".to_owned(),
+            columns: vec![Column::new("Column", ""), Column::new("What it is like", "")],
+            rows: told
+                .iter()
+                .map(|(column, problems)| vec![Cell::text(*column), Cell::text(problems.join("; "))])
+                .collect(),
+            note: String::new(),
+        }));
+    }
+}
+
+/// What was found with its pictures, and what was tried beside it.
+fn evidence(found: &Refinement, blocks: &mut Vec<Block>) {
+    blocks.push(Block::section("Evidence"));
+    if found.effects.is_empty() {
+        blocks.push(Block::paragraph("No effect of the library is named."));
+    }
+    for effect in &found.effects {
+        let kind = effect.effect.kind();
+        blocks.push(Block::part(kind.id));
+        let others: Vec<&str> = effect.ambiguous_with.iter().map(|kind| kind.id).collect();
+        let rivals = if others.is_empty() {
+            String::new()
+        } else {
+            format!(" This log cannot tell it from {}.", others.join(", "))
+        };
+        blocks.push(Block::paragraph(format!(
+            "{}. With it the error on held-out rows is lower by {:.1} % than with all else alone.{rivals} What shows it best: {}.",
+            sentence(kind.summary),
+            effect.error_drop_percent,
+            kind.separated_by
+        )));
+    }
+    blocks.extend(pictures::evidence(found).into_iter().map(Block::Figure));
+    if !found.candidates.is_empty() {
+        blocks.push(Block::Table(tried(found)));
+    }
+}
+
+fn sentence(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
+}
+
+fn tried(found: &Refinement) -> Table {
+    let row = |tried: &super::Tried| {
+        let added = tried.fate == Fate::Added;
+        vec![
+            Cell::text(format!("{} {}", tried.kind.id, tried.detail).trim().to_owned()),
+            number(tried.gain_percent),
+            number(tried.z),
+            Cell::text(if added { "added".to_owned() } else { tried.fate.to_string() }),
+        ]
+    };
+    let left_out = found.candidates.len().saturating_sub(MOST_TRIED);
+    let more =
+        if left_out > 0 { format!("{left_out} more were tried and gain less. ") } else { String::new() };
+    Table {
+        caption: "What was tried".to_owned(),
+        columns: vec![
+            Column::new("Effect", ""),
+            Column::new("Error lower by, alone", "%"),
+            Column::new("Size by its standard error", ""),
+            Column::new("What became of it", ""),
+        ],
+        rows: found.candidates.iter().take(MOST_TRIED).map(row).collect(),
+        note: format!(
+            "{more}Errors on left-out blocks of the fitted rows, each effect alone beside the declared model."
+        ),
     }
 }
 
@@ -99,7 +193,7 @@ fn effects(found: &Refinement) -> Table {
             let first = n == 0;
             let others: Vec<&str> = effect.ambiguous_with.iter().map(|kind| kind.id).collect();
             rows.push(vec![
-                Cell::text(effect.effect.id()),
+                if first { Cell::text(effect.effect.id()) } else { Cell::Empty },
                 Cell::text(key.clone()),
                 number(*value),
                 low,
@@ -131,29 +225,134 @@ fn errors(found: &Refinement) -> Table {
     let mut rows = Vec::new();
     let mut add = |what: &str, of: fn(&Errors) -> &super::Channels| {
         for ((name, before), (_, after)) in of(&found.before).0.iter().zip(&of(&found.after).0) {
-            rows.push(vec![
-                Cell::text(format!("{what}, {name}")),
-                number(before.value),
-                number(after.value),
-                Cell::text(before.unit),
-            ]);
+            let mut row = vec![Cell::text(format!("{what}, {name}"))];
+            for quantity in [before, after] {
+                row.push(number(quantity.value));
+                row.extend(interval(quantity.ci95));
+            }
+            row.push(Cell::text(if before.unit == "1" { "" } else { before.unit }));
+            rows.push(row);
         }
     };
-    add("Root mean square of the residual", |errors| &errors.rmse);
-    add("Relative to the effort", |errors| &errors.nrmse);
+    add("Residual", |errors| &errors.rmse);
+    add("Residual by the torque or force itself", |errors| &errors.nrmse);
     add("Noise of the sensors alone", |errors| &errors.noise_floor);
     Table {
-        caption: "Residual on held-out rows".to_owned(),
+        caption: "Root mean squares on held-out rows".to_owned(),
         columns: vec![
+            Column::new("Measure", ""),
+            Column::grouped("Before", "value", ""),
+            Column::grouped("Before", "from", ""),
+            Column::grouped("Before", "to", ""),
+            Column::grouped("After", "value", ""),
+            Column::grouped("After", "from", ""),
+            Column::grouped("After", "to", ""),
+            Column::new("Unit", ""),
+        ],
+        rows,
+        note: "The same rows and filters before and after; before: the declared model, its parameters estimated within \
+               their tolerances. Intervals of 95 % by blocks of the held-out rows."
+            .to_owned(),
+    }
+}
+
+fn predictions(found: &Refinement) -> Table {
+    let row = |(before, after): (&Prediction, &Prediction)| {
+        let cell = |quantity: &Quantity| number(quantity.value);
+        vec![
+            Cell::text(before.variable),
+            Cell::Number(format!("{:.0}", 1e3 * before.horizon_s)),
+            cell(&before.rmse),
+            cell(&after.rmse),
+            cell(&after.noise_floor),
+            cell(&before.motion),
+            Cell::text(before.rmse.unit),
+        ]
+    };
+    Table {
+        caption: "Short predictions from the log's own states under its torques".to_owned(),
+        columns: vec![
+            Column::new("Of", ""),
+            Column::new("Ahead", "ms"),
+            Column::grouped("Error", "declared", ""),
+            Column::grouped("Error", "refined", ""),
+            Column::new("Noise alone", ""),
+            Column::new("Motion", ""),
+            Column::new("Unit", ""),
+        ],
+        rows: found.before.prediction.iter().zip(&found.after.prediction).map(row).collect(),
+        note: "Root mean squares over held-out starts. Noise alone: what the scatter of the readings at the start and the end \
+               makes of it. A robot that balances is unstable, so that its noise grows with the horizon."
+            .to_owned(),
+    }
+}
+
+fn simulated(closed_loop: &ClosedLoop, blocks: &mut Vec<Block>) {
+    blocks.push(Block::section("The closed loop, simulated"));
+    let mut rows = Vec::new();
+    for pair in &closed_loop.scenarios {
+        let both = |what: &str, of: &dyn Fn(&LoopRun) -> f64, unit: &'static str| {
+            vec![
+                Cell::text(pair.scenario.clone()),
+                Cell::text(what),
+                number(of(&pair.before)),
+                number(of(&pair.after)),
+                Cell::text(unit),
+            ]
+        };
+        rows.push(both("x, standard deviation", &|run| 1e3 * run.x_m.std, "mm"));
+        rows.push(both("x, peak to peak", &|run| 1e3 * run.x_m.peak_to_peak, "mm"));
+        rows.push(both("x_dot, standard deviation", &|run| 1e3 * run.x_dot_m_s.std, "mm/s"));
+        rows.push(both("pitch, standard deviation", &|run| 1e3 * run.pitch_rad.std, "mrad"));
+        rows.push(both("pitch, peak to peak", &|run| 1e3 * run.pitch_rad.peak_to_peak, "mrad"));
+        let cycle = |run: &LoopRun| match (run.fell, run.limit_cycle) {
+            (true, _) => Cell::text("fell"),
+            (_, Some(cycle)) => {
+                Cell::text(format!("{:.1} mm at {:.2} Hz", 1e3 * cycle.amplitude_m, cycle.frequency_hz))
+            }
+            (_, None) => Cell::text("none"),
+        };
+        rows.push(vec![
+            Cell::text(pair.scenario.clone()),
+            Cell::text("limit cycle"),
+            cycle(&pair.before),
+            cycle(&pair.after),
+            Cell::Empty,
+        ]);
+    }
+    blocks.push(Block::Table(Table {
+        caption: "The refined model under the controller of the declared and of the refined model".to_owned(),
+        columns: vec![
+            Column::new("Scenario", ""),
             Column::new("Measure", ""),
             Column::new("Before", ""),
             Column::new("After", ""),
             Column::new("Unit", ""),
         ],
         rows,
-        note: "The same rows and filters before and after; before: the declared model, its parameters estimated within \
-               their tolerances."
-            .to_owned(),
+        note: String::new(),
+    }));
+    for fed in &closed_loop.feedforward {
+        let (tone, label) = if fed.used { (Tone::Good, "used") } else { (Tone::Note, "not used") };
+        let label = format!("{} in the controller: {label}", fed.effect.id);
+        blocks.push(Block::notice(tone, label, fed.reason.clone()));
+    }
+}
+
+fn remains(found: &Refinement, blocks: &mut Vec<Block>) {
+    blocks.push(Block::section("What remains"));
+    if found.unexplained.description.is_empty() {
+        blocks.push(Block::paragraph(
+            "Nothing that the tests of this program could tell from noise. That is no proof that nothing is left.",
+        ));
+    } else {
+        blocks.push(Block::notice(Tone::Warning, "Unexplained", found.unexplained.description.clone()));
+    }
+    let Some(next) = &found.next_experiment else { return };
+    blocks.push(Block::part("What to record next"));
+    blocks.push(Block::paragraph(sentence(&next.summary)));
+    if let Some(command) = &next.command {
+        blocks.push(Block::paragraph(format!("On the simulated robot: {command}")));
     }
 }
 
@@ -174,56 +373,4 @@ fn parameters(found: &Refinement) -> Table {
         rows: found.parameters.iter().map(row).collect(),
         note: String::new(),
     }
-}
-
-fn pictures(explorer: &Explorer) -> Vec<Chart> {
-    explorer.variables.iter().map(|variable| picture(explorer, variable)).collect()
-}
-
-/// The residual over a variable; over time as it is, over others as means in bins.
-fn picture(explorer: &Explorer, variable: &Variable) -> Chart {
-    let in_time = variable.name == "time_s";
-    let held = |values: &[f64]| -> Vec<f64> {
-        values.iter().zip(&explorer.held_out).filter(|(_, held)| **held).map(|(value, _)| *value).collect()
-    };
-    let values = held(&variable.values);
-    let in_a_turn: Vec<f64> = if variable.name == "motor_angle_rad" {
-        values.iter().map(|angle| angle.rem_euclid(std::f64::consts::TAU)).collect()
-    } else {
-        values
-    };
-    let series = |name: &str, residual: &[f64], mark: Mark| {
-        let residual = held(residual);
-        let points: Vec<[f64; 2]> = if in_time {
-            in_a_turn.iter().zip(&residual).map(|(x, y)| [*x, *y]).collect()
-        } else {
-            binned(&in_a_turn, &residual)
-        };
-        Series::new(name, if in_time { Mark::Scatter } else { mark }, points)
-    };
-    Chart {
-        title: format!("Residual over {}", variable.name),
-        description: "Residual on held-out rows, before and after; means in bins, over time as it is."
-            .to_owned(),
-        x: Axis::new(variable.name, variable.unit),
-        panels: vec![Panel::new(
-            Axis::new(format!("Residual of {}", explorer.channel), explorer.unit),
-            vec![
-                series("before", &explorer.before, Mark::Dashed),
-                series("after", &explorer.after, Mark::Line),
-            ],
-        )],
-    }
-}
-
-/// Means of `values` in bins of `over` with the same number of rows.
-fn binned(over: &[f64], values: &[f64]) -> Vec<[f64; 2]> {
-    let mut pairs: Vec<[f64; 2]> = over.iter().zip(values).map(|(x, y)| [*x, *y]).collect();
-    pairs.sort_by(|a, b| a[0].total_cmp(&b[0]));
-    let size = pairs.len().div_ceil(BINS).max(1);
-    let mean = |bin: &[[f64; 2]]| {
-        let sum = bin.iter().fold([0.0; 2], |sum, pair| [sum[0] + pair[0], sum[1] + pair[1]]);
-        sum.map(|sum| sum / bin.len() as f64)
-    };
-    pairs.chunks(size).map(mean).collect()
 }

@@ -53,7 +53,7 @@ impl Settings {
     }
 
     fn options(&self) -> Options {
-        Options { motor: self.motor, estimate: self.names(), seed: self.seed }
+        Options { motor: self.motor, estimate: self.names(), seed: self.seed, ..Options::default() }
     }
 }
 

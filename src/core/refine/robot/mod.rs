@@ -37,6 +37,7 @@ use super::{Explorer, NextExperiment, Options, Variable};
 use candidates::library;
 use channels::Channels;
 use motion::Readings;
+pub(super) use motion::{at_even_times, fresh_rows};
 use nuisance::{Nuisance, nuisances};
 use search::{Fit, Search, whitened};
 use trace::{Pair, Part, Trace};
@@ -65,6 +66,7 @@ pub(super) fn residual(
     if health::unfit(&data_health) {
         return Ok(Residual { errors: Errors::default(), tests: Vec::new(), data_health });
     }
+    let readings: Vec<Readings> = readings.into_iter().map(|r| r.acting(robot)).collect();
     let trace = Trace::new(robot, readings.clone(), readings);
     data_health.extend(health::check_motion(&trace));
     report(watch, 0.8)?;
@@ -89,6 +91,13 @@ fn read(logs: &[Log]) -> Result<Vec<Readings>, RefineError> {
     logs.iter().map(read).collect()
 }
 
+/// Every row of a log as a law sees it, from the left and from the right motor.
+pub(super) fn moments(robot: &RobotModel, log: &Log) -> Option<[Vec<Moment>; 2]> {
+    let readings = Readings::new(log).filter(|readings| readings.rows() > 100)?.acting(robot);
+    let kernel = kernel::Kernel::new(readings.dt_s);
+    Some(motion::Motion::new(&readings, robot, &kernel, None, 0.0).moments)
+}
+
 /// Finds what the model of a robot lacks. Without `held_out` logs the last third of each log is held out.
 pub(super) fn refine(
     model: &Model,
@@ -103,6 +112,8 @@ pub(super) fn refine(
     if health::unfit(&data_health) {
         return Ok(unfit(model, data_health));
     }
+    let acting = |readings: Vec<Readings>| readings.into_iter().map(|r| r.acting(robot)).collect::<Vec<_>>();
+    let (training, others) = (acting(training), acting(others));
     let biases = found::gyro_bias(&training);
     let mut trace = Trace::new(robot, training, others);
     data_health.extend(health::check_motion(&trace));

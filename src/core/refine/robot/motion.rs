@@ -87,9 +87,32 @@ impl Readings {
             fresh: Vec::new(),
         }
     }
+
+    /// With what the model declares between controller and shaft, and in the IMU, taken account of: torques as they act,
+    /// readings without their offsets.
+    pub(super) fn acting(mut self, robot: &RobotModel) -> Self {
+        let places = robot.actuation.delay_s / self.dt_s;
+        let (whole, share) = (places.floor() as usize, places.fract());
+        for torque in &mut self.torque_nm {
+            let at = |row: usize, back: usize| torque[row.saturating_sub(back)];
+            *torque = (0..torque.len())
+                .map(|row| (1.0 - share) * at(row, whole) + share * at(row, whole + 1))
+                .collect();
+        }
+        let sensors = &robot.sensors;
+        self.pitch_rad.iter_mut().for_each(|pitch| *pitch -= sensors.imu_mount_angle_rad);
+        self.rate_rad_s.iter_mut().for_each(|rate| *rate -= sensors.gyro_bias_rad_s);
+        self
+    }
 }
 
-fn at_even_times(time: &[f64], column: &[f64], dt_s: f64, rows: usize, held: bool) -> Vec<f64> {
+pub(in crate::refine) fn at_even_times(
+    time: &[f64],
+    column: &[f64],
+    dt_s: f64,
+    rows: usize,
+    held: bool,
+) -> Vec<f64> {
     let mut before = 0;
     let at = |i: usize| {
         let t = time[0] + i as f64 * dt_s;
@@ -103,7 +126,7 @@ fn at_even_times(time: &[f64], column: &[f64], dt_s: f64, rows: usize, held: boo
 }
 
 /// Rows at which a held reading is new: where it changes, and in its rhythm where it happens to stay.
-fn fresh_rows(pitch: &[f64], rate: &[f64]) -> Vec<usize> {
+pub(in crate::refine) fn fresh_rows(pitch: &[f64], rate: &[f64]) -> Vec<usize> {
     let changes: Vec<usize> = std::iter::once(0)
         .chain((1..pitch.len()).filter(|&i| pitch[i] != pitch[i - 1] || rate[i] != rate[i - 1]))
         .collect();
@@ -199,7 +222,8 @@ fn centred(column: &[f64]) -> Vec<f64> {
 }
 
 impl Motion {
-    /// The motion of `robot`, with the loads of effects beside it, whose IMU speaks `imu_delay_s` late.
+    /// The motion of `robot`, with the loads of effects beside it, whose IMU speaks `imu_delay_s` later than
+    /// declared.
     pub(super) fn new(
         readings: &Readings,
         robot: &RobotModel,
@@ -210,6 +234,7 @@ impl Motion {
         let (rows, dt) = (readings.rows(), readings.dt_s);
         let p = &robot.parameters;
         let radius = p.wheel_radius_m;
+        let imu_delay_s = imu_delay_s + robot.sensors.imu_latency_s;
         let turned: Vec<f64> =
             (0..rows).map(|i| 0.5 * (readings.angle_rad[0][i] + readings.angle_rad[1][i])).collect();
         let speeds = [0, 1].map(|motor: usize| slope(&readings.angle_rad[motor], dt));

@@ -2,8 +2,9 @@
 
 use std::f64::consts::TAU;
 
-use crate::effects::{Action, EffectKind, Form, Machine, Moment, Place, Term};
+use crate::effects::{Action, Effect, EffectKind, Form, Law, Machine, Moment, Place, Term};
 use crate::model_file::RobotModel;
+use crate::robot::Motor;
 
 use super::kernel::Kernel;
 use super::motion::{Loads, Motion, Readings, of_action};
@@ -71,7 +72,41 @@ impl<'a> Trace<'a> {
                 Piece { parts: parts(&readings, fit), readings, motion }
             })
             .collect();
-        Self { robot, machine: Machine::robot(robot), kernel, pieces }
+        let mut trace = Self { robot, machine: Machine::robot(robot), kernel, pieces };
+        trace.take_off_known();
+        trace
+    }
+
+    /// Takes what the model's own effects do off the residual.
+    fn take_off_known(&mut self) {
+        let known: Vec<Vec<Pair>> = self
+            .robot
+            .effects
+            .iter()
+            .map(|effect| self.each(|piece| self.raw_effect(effect, piece)))
+            .collect();
+        for raw in &known {
+            for (piece, raw) in self.pieces.iter_mut().zip(raw) {
+                for (residual, raw) in piece.motion.residual.iter_mut().zip(raw) {
+                    let known = self.kernel.apply(raw, 0);
+                    residual.iter_mut().zip(&known).for_each(|(left, known)| *left -= known);
+                }
+            }
+        }
+    }
+
+    fn each(&self, of: impl Fn(&Piece) -> Pair) -> Vec<Pair> {
+        self.pieces.iter().map(of).collect()
+    }
+
+    fn raw_effect(&self, effect: &Effect, piece: &Piece) -> Pair {
+        let kind = effect.kind();
+        let motors: Vec<usize> = if kind.per_motor() {
+            Motor::BOTH.into_iter().filter(|motor| effect.is_in(*motor)).map(|motor| motor as usize).collect()
+        } else {
+            vec![0]
+        };
+        self.raw_law(kind, &effect.law(&self.machine), piece, &motors)
     }
 
     /// All rows of some logs for fitting.
@@ -147,6 +182,7 @@ impl<'a> Trace<'a> {
         for (piece, loads) in self.pieces.iter_mut().zip(loads) {
             piece.motion = Motion::new(&piece.readings, self.robot, &self.kernel, Some(loads), imu_delay_s);
         }
+        self.take_off_known();
     }
 
     /// r1 and r2 of an arbitrary action over the rows; `action` makes a fresh law for each log.
@@ -234,13 +270,17 @@ impl<'a> Trace<'a> {
     }
 
     fn raw_term(&self, kind: &'static EffectKind, term: &Term, piece: &Piece) -> Pair {
+        let motors: &[usize] = if kind.per_motor() { &[0, 1] } else { &[0] };
+        self.raw_law(kind, &*term.law, piece, motors)
+    }
+
+    fn raw_law(&self, kind: &'static EffectKind, law: &dyn Law, piece: &Piece, motors: &[usize]) -> Pair {
         let radius = self.machine.parameters.wheel_radius_m;
         let rows = piece.readings.rows();
         let mut raw = [vec![0.0; rows], vec![0.0; rows]];
-        let motors = if kind.per_motor() { 2 } else { 1 };
         let moments = if kind.place == Place::Actuator { &piece.motion.asked } else { &piece.motion.moments };
-        for moments in moments.iter().take(motors) {
-            let mut law = term.law.clone();
+        for moments in motors.iter().map(|&motor| &moments[motor]) {
+            let mut law = law.boxed_clone();
             for (row, moment) in moments.iter().enumerate() {
                 let [r1, r2] = of_action(&law.act(moment), moment.direction(), radius);
                 raw[0][row] += r1;
@@ -279,12 +319,18 @@ impl<'a> Trace<'a> {
             let rows = piece.readings.rows();
             let mut loads =
                 Loads { shafts_nm: vec![0.0; rows], axle_n: vec![0.0; rows], body_nm: vec![0.0; rows] };
-            for (kind, term, size) in chosen {
-                let [r1, r2] = self.raw_term(kind, term, piece);
+            let known = self
+                .robot
+                .effects
+                .iter()
+                .map(|effect| (effect.kind().per_motor(), self.raw_effect(effect, piece), 1.0));
+            let chosen = chosen
+                .iter()
+                .map(|(kind, term, size)| (kind.per_motor(), self.raw_term(kind, term, piece), *size));
+            for (in_motor, [r1, r2], size) in known.chain(chosen) {
                 for row in 0..rows {
                     // The same accelerations come from a force at the axle and a torque on the body.
-                    let motor = kind.per_motor();
-                    if motor {
+                    if in_motor {
                         loads.shafts_nm[row] += size * r1[row] * radius;
                     } else {
                         loads.axle_n[row] += size * r1[row];

@@ -1,0 +1,74 @@
+//! `flqr demo`: the whole loop without hardware or files.
+
+use std::io::{self, Write};
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+
+use clap::Args;
+use flqr_core::refine::{Demonstration, demonstrate};
+
+use super::output::{Failure, Output, complain, number};
+use super::progress::Progress;
+use super::{file, refine};
+
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// Chooses what the simulated robot has that its model lacks, and draws all noise
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Write the refined model (TOML)
+    #[arg(long, value_name = "NEW.toml")]
+    out: Option<PathBuf>,
+    /// Write the report with its figures as one HTML file
+    #[arg(long, value_name = "OUT.html")]
+    report: Option<PathBuf>,
+}
+
+pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
+    let bar = Progress::new("demo");
+    let shown = demonstrate(arguments.seed, &mut |share| {
+        bar.set((1000.0 * share) as u64, 1000);
+        ControlFlow::Continue(())
+    })
+    .map_err(Failure::from_error)?;
+    drop(bar);
+    let found = &shown.found;
+    if let Some(path) = &arguments.out {
+        file::write(path, "model", |out| out.write_all(found.model.to_toml().as_bytes()))?;
+        complain(&format!("the refined model is in {}", path.display()));
+    }
+    if let Some(path) = &arguments.report {
+        file::write(path, "report", |out| out.write_all(found.document.to_html().as_bytes()))?;
+        complain(&format!("the report with its figures is in {}", path.display()));
+    }
+    output.result(&shown, |out| print(out, &shown))
+}
+
+fn print(out: &mut dyn Write, shown: &Demonstration) -> io::Result<()> {
+    writeln!(out, "1. The robot of the paper is simulated with something that its model does not have.")?;
+    writeln!(out, "2. It balances under the controller of that model and is recorded:")?;
+    for log in &shown.logs {
+        writeln!(out, "   {}, {} rows", log.source, log.rows())?;
+    }
+    let before = &shown.found.before;
+    if let (Some((channel, error)), Some((_, noise))) = (before.rmse.0.first(), before.noise_floor.0.first())
+    {
+        writeln!(
+            out,
+            "3. The residual of the model, {channel}, is {} {}; noise of the sensors alone would make it {}.",
+            number(error.value),
+            error.unit,
+            number(noise.value)
+        )?;
+    }
+    writeln!(out, "4. What the model lacks is looked for in the records alone:\n")?;
+    refine::print(out, &shown.found)?;
+    let truth = &shown.truth;
+    writeln!(out, "\n5. In truth the robot had:\n\n{}{:>31}{:>14}", truth.effect.id(), "true", "found")?;
+    let own = shown.found.effects.iter().find(|effect| effect.effect.kind() == truth.effect.kind());
+    for (key, value) in truth.effect.parameters() {
+        let estimate = own.and_then(|own| own.effect.get(key)).map_or("not".to_owned(), number);
+        writeln!(out, "  {key:24}{:>14}{estimate:>14}", number(*value))?;
+    }
+    writeln!(out, "\n{}", if truth.named { "It was found." } else { "It was not found by its name." })
+}
