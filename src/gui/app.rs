@@ -345,6 +345,9 @@ impl App {
                 if let FilePurpose::Refine(purpose) = purpose {
                     self.refine.note_dialog_problem(purpose, &problem);
                 }
+                if let FilePurpose::SaveFigure(file) = purpose {
+                    self.commands.send(Command::ChooseFigure(file, Err(problem)));
+                }
             }
         }
     }

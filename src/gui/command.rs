@@ -11,6 +11,7 @@ use flqr_core::robot::RobotParameters;
 
 use crate::experiments::SavedAs;
 use crate::layout::Side;
+use crate::plot::FigureFile;
 use crate::refine::{RefineCommand, RefineFile};
 use crate::tab::Tab;
 
@@ -84,6 +85,7 @@ pub(crate) enum FilePurpose {
     OpenReplay,
     SaveRecording,
     Refine(RefineFile),
+    SaveFigure(FigureFile),
 }
 
 /// One wish of a view.
@@ -161,6 +163,8 @@ pub(crate) enum Command {
     ChooseReplay(PathBuf),
     /// Chooses the file to record to.
     ChooseRecording(PathBuf),
+    /// Where a figure is saved to, or why no dialog has said so.
+    ChooseFigure(FigureFile, Result<PathBuf, String>),
     /// One sentence for the status line.
     Say(String),
 }

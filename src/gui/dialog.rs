@@ -20,6 +20,7 @@ fn instead(purpose: FilePurpose) -> &'static str {
         | FilePurpose::SaveExperiment(_)
         | FilePurpose::Refine(RefineFile::Save(_)) => "type a path above and press Save",
         FilePurpose::SaveRecording => "type a path above and press Record",
+        FilePurpose::SaveFigure(_) => "type a path above and press Save figure",
         FilePurpose::OpenReplay => "type the path above",
         FilePurpose::OpenModel | FilePurpose::OpenLog | FilePurpose::Refine(RefineFile::Log) => {
             "type the path instead, or drop the file onto the window"
@@ -64,6 +65,9 @@ fn ask(purpose: FilePurpose, suggestion: &str) -> Answer {
         }
         FilePurpose::SaveRecording => {
             dialog.set_title("Record to").add_filter("Log", &["csv"]).set_file_name(suggestion).save_file()
+        }
+        FilePurpose::SaveFigure(_) => {
+            dialog.set_title("Save the figure").set_file_name(suggestion).save_file()
         }
         FilePurpose::OpenReplay => {
             dialog.set_title("Replay a recording").add_filter("Recording", &["csv", "log"]).pick_file()

@@ -25,6 +25,7 @@ mod layout;
 mod live;
 mod load;
 mod messages;
+mod picture;
 pub mod plot;
 mod quantity;
 mod recent;

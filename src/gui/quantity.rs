@@ -19,14 +19,30 @@ impl Quantity {
         match (channel, degrees) {
             (Channel::Displacement, _) => Self::plain("displacement", "m", 0.02),
             (Channel::Velocity, _) => Self::plain("velocity", "m/s", 0.04),
-            (Channel::Pitch, true) => Self { scale: 1.0_f64.to_degrees(), ..Self::plain("pitch", "°", 0.4) },
+            (Channel::Pitch, true) => Self::in_degrees("pitch", "°", 0.4),
             (Channel::Pitch, false) => Self::plain("pitch", "rad", 0.007),
+            (Channel::PitchRate, true) => Self::in_degrees("pitch rate", "°/s", 2.0),
+            (Channel::PitchRate, false) => Self::plain("pitch rate", "rad/s", 0.035),
+            (Channel::LeftAngle, true) => Self::in_degrees("left angle", "°", 2.0),
+            (Channel::LeftAngle, false) => Self::plain("left angle", "rad", 0.035),
+            (Channel::RightAngle, true) => Self::in_degrees("right angle", "°", 2.0),
+            (Channel::RightAngle, false) => Self::plain("right angle", "rad", 0.035),
+            (Channel::LeftSpeed, true) => Self::in_degrees("left speed", "°/s", 6.0),
+            (Channel::LeftSpeed, false) => Self::plain("left speed", "rad/s", 0.1),
+            (Channel::RightSpeed, true) => Self::in_degrees("right speed", "°/s", 6.0),
+            (Channel::RightSpeed, false) => Self::plain("right speed", "rad/s", 0.1),
+            (Channel::LeftTorque, _) => Self::plain("left torque", "N m", 0.01),
+            (Channel::RightTorque, _) => Self::plain("right torque", "N m", 0.01),
         }
     }
 
     /// A quantity that is shown in the core's unit.
     pub(crate) const fn plain(name: &'static str, unit: &'static str, min_span: f64) -> Self {
         Self { name, unit, scale: 1.0, min_span }
+    }
+
+    const fn in_degrees(name: &'static str, unit: &'static str, min_span: f64) -> Self {
+        Self { name, unit, scale: 180.0 / std::f64::consts::PI, min_span }
     }
 
     /// Name and unit, for an axis.

@@ -115,6 +115,12 @@ impl Document {
 impl Chart {
     /// The chart as a picture of its own, light or dark as its surroundings ask for.
     pub fn to_svg(&self) -> String {
-        svg::picture(self)
+        svg::picture(self, [svg::WIDE, f64::NAN])
+    }
+
+    /// The same of a given width and height, px: the height is that of the panels with their legend and axes, which
+    /// take what they need of it.
+    pub fn to_svg_of(&self, size: [f64; 2]) -> String {
+        svg::picture(self, size)
     }
 }

@@ -19,6 +19,11 @@ pub(super) const NARROW: f64 = 420.0;
 /// Looks of all charts; colours that people with any colour vision tell apart, on white and on dark.
 pub(super) const STYLE: &str = include_str!("chart.css");
 
+/// Widths and heights of pictures, px.
+const SMALLEST: f64 = 200.0;
+const LARGEST: f64 = 10_000.0;
+/// A panel is at least this high, px.
+const LEAST_PANEL: f64 = 40.0;
 const LINE_HEIGHT: f64 = 18.0;
 /// Width of a character, px; generous, so that texts keep clear of each other in most fonts.
 const CHARACTER: f64 = 7.2;
@@ -31,10 +36,15 @@ const COLOURS: usize = 6;
 const DASHES: usize = 3;
 const TINTS: usize = 3;
 
-/// A file of its own.
-pub(super) fn picture(chart: &Chart) -> String {
+/// A file of its own, of a width and a height; NaN for the usual ones.
+pub(super) fn picture(chart: &Chart, [width, height]: [f64; 2]) -> String {
     let mut markup = Markup::default();
-    draw(chart, WIDE, "wide", "chart", Some(STYLE), &mut markup);
+    let width = if width.is_finite() { width.clamp(SMALLEST, LARGEST) } else { WIDE };
+    let mut layout = Layout::new(chart, width);
+    if height.is_finite() {
+        layout.stretch(chart, height.min(LARGEST));
+    }
+    draw_layout(chart, &layout, "wide", "chart", Some(STYLE), &mut markup);
     markup.into_string()
 }
 
@@ -48,7 +58,18 @@ pub(super) fn draw(
     style: Option<&str>,
     markup: &mut Markup,
 ) {
-    let layout = Layout::new(chart, width);
+    draw_layout(chart, &Layout::new(chart, width), name, id, style, markup);
+}
+
+fn draw_layout(
+    chart: &Chart,
+    layout: &Layout,
+    name: &str,
+    id: &str,
+    style: Option<&str>,
+    markup: &mut Markup,
+) {
+    let width = layout.width;
     let [title, description] = ["title", "text"].map(|part| format!("{id}-{part}"));
     let names = format!("{title} {description}");
     let view = format!("0 0 {} {}", Px(width), Px(layout.height));
@@ -166,11 +187,15 @@ impl Layout {
         let entries = layout.entries(chart);
         layout.legend = if entries.len() > 1 { rows(entries, width) } else { Vec::new() };
         layout.place_panels(chart);
-        let labels = layout.panels.iter().flat_map(|place| place.y.ticks(Y_SPACING));
-        let widest = labels.map(|tick| text_width(&tick.label)).fold(0.0, f64::max);
-        layout.left = widest + 12.0;
-        layout.x.to = [layout.left, width - RIGHT];
+        layout.fit_labels();
         layout
+    }
+
+    fn fit_labels(&mut self) {
+        let labels = self.panels.iter().flat_map(|place| place.y.ticks(Y_SPACING));
+        let widest = labels.map(|tick| text_width(&tick.label)).fold(0.0, f64::max);
+        self.left = widest + 12.0;
+        self.x.to = [self.left, self.width - RIGHT];
     }
 
     fn place_panels(&mut self, chart: &Chart) {
@@ -180,6 +205,20 @@ impl Layout {
             (_, false) => 170.0,
             (_, true) => 140.0,
         };
+        self.place_panels_of(chart, plot_height);
+    }
+
+    /// Lets the panels take what is left of a height.
+    fn stretch(&mut self, chart: &Chart, height: f64) {
+        let Some(first) = self.panels.first() else { return };
+        let more = (height - self.height) / self.panels.len() as f64;
+        let plot_height = (first.height + more).max(LEAST_PANEL);
+        self.place_panels_of(chart, plot_height);
+        self.fit_labels();
+    }
+
+    fn place_panels_of(&mut self, chart: &Chart, plot_height: f64) {
+        self.panels.clear();
         let legend = LINE_HEIGHT * self.legend.len() as f64;
         let mut top = if legend > 0.0 { legend + 10.0 } else { 4.0 };
         for panel in &chart.panels {

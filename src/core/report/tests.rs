@@ -140,6 +140,23 @@ fn sample(words: &str) -> Document {
 }
 
 #[test]
+fn a_picture_has_the_size_that_is_asked_for_as_far_as_its_texts_allow() {
+    let size = |asked: [f64; 2]| {
+        let svg = chart("sized", wave(500)).to_svg_of(asked);
+        check_xml(&svg);
+        let (_, view) = svg.split_once("viewBox=\"0 0 ").unwrap();
+        let (view, _) = view.split_once('"').unwrap();
+        let mut sides = view.split(' ').map(|side| side.parse::<f64>().unwrap());
+        [sides.next().unwrap(), sides.next().unwrap()]
+    };
+    assert_eq!(size([640.0, 480.0]), [640.0, 480.0]);
+    assert_eq!(size([1600.0, 900.0]), [1600.0, 900.0]);
+    let [width, height] = size([300.0, 1.0]);
+    assert!(width == 300.0 && height < 400.0, "{height}");
+    assert!(size([f64::NAN, 1e9])[1] <= 10_000.0);
+}
+
+#[test]
 fn reports_are_well_formed_and_say_what_they_are_given() {
     for document in [sample("plain words"), sample(NASTY), Document::default()] {
         let said = check_xml(&document.to_html());

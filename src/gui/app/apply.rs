@@ -36,6 +36,7 @@ pub(super) fn chosen(purpose: FilePurpose, path: PathBuf) -> Command {
         FilePurpose::OpenLog => Command::LoadLog(path),
         FilePurpose::OpenReplay => Command::ChooseReplay(path),
         FilePurpose::SaveRecording => Command::ChooseRecording(path),
+        FilePurpose::SaveFigure(file) => Command::ChooseFigure(file, Ok(path)),
         // The dialog knows one name as it was typed; what is written may have another or several.
         FilePurpose::Refine(RefineFile::Log) => {
             Command::Refine(RefineCommand::Load { path, held_out: false })
@@ -149,6 +150,7 @@ impl App {
             Command::Order(order) => self.link.send(order),
             Command::ChooseReplay(path) => self.robot.form.replay = path.display().to_string(),
             Command::ChooseRecording(path) => self.robot.note_recording_path(&path),
+            Command::ChooseFigure(file, answer) => file.answer(ctx, answer),
             Command::Say(text) => self.say(text),
         }
         ctx.request_repaint();
@@ -274,6 +276,7 @@ impl App {
             FilePurpose::SaveExperiment(saved_as) => self.experiments.suggested_name(saved_as),
             FilePurpose::Refine(RefineFile::Save(saved_as)) => self.refine.suggested_name(saved_as),
             FilePurpose::SaveRecording => self.robot.suggested_name(),
+            FilePurpose::SaveFigure(file) => file.suggestion(),
             _ => name.map_or_else(|| "model.toml".to_owned(), |name| name.to_string_lossy().into_owned()),
         };
         match Dialog::open(purpose, suggestion, &self.waker) {

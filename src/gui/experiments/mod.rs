@@ -23,12 +23,12 @@ use egui::{
 use flqr_core::model_file::{Model, RobotModel};
 use flqr_core::simulate::Summary;
 
-use crate::command::FilePurpose;
+use crate::command::{Commands, FilePurpose};
 use crate::context::ViewContext;
 use crate::job::Waker;
 use crate::plot::Marks;
 use crate::theme::palette;
-use crate::widgets::{choice_ui, error_ui, hint_ui, section_ui, warning_ui};
+use crate::widgets::{error_ui, hint_ui, section_ui, warning_ui};
 use dials::{Dials, GREATEST_HEIGHT};
 use form::Limited;
 use playback::Playback;
@@ -56,7 +56,6 @@ pub(crate) struct ExperimentsTab {
     playback: Playback,
     table: StatisticsTable,
     saver: Saver,
-    degrees: bool,
     /// Where plots, robot and statistics were drawn.
     page: Rect,
     /// Height of the statistics when they were drawn last.
@@ -75,7 +74,6 @@ impl Default for ExperimentsTab {
             playback: Playback::default(),
             table: StatisticsTable::default(),
             saver: Saver::default(),
-            degrees: false,
             page: Rect::NOTHING,
             table_height: 290.0,
         }
@@ -103,7 +101,7 @@ impl ExperimentsTab {
         let Some(comparison) = self.runs.comparison() else {
             return Err("There is no run to save: run an experiment first.".to_owned());
         };
-        let visible_s = self.plots.view.range();
+        let visible_s = self.plots.stack.view.range();
         let extent = Extent { range_s: self.table.range(comparison, visible_s), visible_s };
         self.saver.start(comparison, extent, (saved_as, path, replace), self.page, ctx, waker)
     }
@@ -149,7 +147,7 @@ impl ExperimentsTab {
             self.marks = Marks::new(limits);
             let step = comparison.recorded().any(|(_, run)| run.tracking().is_some());
             let shown_s = if step { STEP_VIEW_S.min(limits[1]) } else { limits[1] };
-            self.plots.view.show_all([0.0, shown_s]);
+            self.plots.stack.view.show_all([0.0, shown_s]);
             self.table.choice = match self.table.choice {
                 Choice::Chosen(range) if range[1] <= limits[1] => Choice::Chosen(range),
                 _ => Choice::Usual,
@@ -167,7 +165,7 @@ impl ExperimentsTab {
     /// What the page shows, as `--state-out` writes it.
     pub(crate) fn snapshot(&self) -> serde_json::Value {
         let runs = self.runs.comparison().map(|comparison| {
-            let range = self.table.range(comparison, self.plots.view.range());
+            let range = self.table.range(comparison, self.plots.stack.view.range());
             let found = comparison.statistics_between(range);
             let runs = Variant::ALL.iter().zip(&comparison.runs).zip(found);
             runs.map(|((variant, run), statistics)| snapshot_of(comparison, *variant, run, statistics))
@@ -186,7 +184,8 @@ impl ExperimentsTab {
     }
 
     pub(crate) fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
-        self.playback.keys(ui, &mut self.marks);
+        let arrows = !self.plots.stack.has_cursors();
+        self.playback.keys(ui, arrows, &mut self.marks);
         let side = Frame::side_top_panel(ui.style()).inner_margin(Margin::symmetric(10, 6));
         Panel::left("experiment")
             .frame(side)
@@ -204,7 +203,7 @@ impl ExperimentsTab {
                 });
             });
         if let Some(comparison) = self.runs.comparison().cloned() {
-            self.marks.range = self.table.range(&comparison, self.plots.view.range());
+            self.marks.range = self.table.range(&comparison, self.plots.stack.view.range());
             self.marks.shade = self.table.choice != Choice::Visible && self.marks.range != self.marks.limits;
             self.page = ui.available_rect_before_wrap();
             let width = (0.29 * ui.ctx().content_rect().width()).clamp(372.0, 560.0);
@@ -218,7 +217,9 @@ impl ExperimentsTab {
                     ScrollArea::vertical().show(ui, |ui| self.robot_ui(&comparison, ui, height));
                 });
             let middle = Frame::central_panel(ui.style()).inner_margin(Margin::symmetric(10, 6));
-            CentralPanel::default().frame(middle).show(ui, |ui| self.plots_ui(&comparison, ui));
+            CentralPanel::default()
+                .frame(middle)
+                .show(ui, |ui| self.plots_ui(&comparison, context.commands, ui));
         } else {
             CentralPanel::default().show(ui, empty_ui);
         }
@@ -260,18 +261,19 @@ impl ExperimentsTab {
         }
         let tables = ui.scope(|ui| {
             table::tracking_ui(ui, comparison);
-            self.table.ui(ui, comparison, self.degrees, &self.marks);
+            self.table.ui(ui, comparison, self.plots.stack.units.degrees, &self.marks);
         });
         self.table_height = tables.response.rect.height() + spacing;
     }
 
-    fn plots_ui(&mut self, comparison: &Comparison, ui: &mut Ui) {
+    fn plots_ui(&mut self, comparison: &Comparison, commands: &Commands, ui: &mut Ui) {
         ui.horizontal(|ui| self.head_ui(comparison, ui));
+        ui.horizontal_wrapped(|ui| self.plots.tools_ui(ui, comparison));
         let transport = ui.spacing().interact_size.y + ui.spacing().item_spacing.y;
         let size = vec2(ui.available_width(), (ui.available_height() - transport).max(1.0));
         let moved = ui.allocate_ui(size, |ui| {
             ui.set_min_height(size.y);
-            self.plots.ui(ui, comparison, self.degrees, &mut self.marks)
+            self.plots.ui(ui, comparison, commands, &mut self.marks)
         });
         if moved.inner.cursor {
             self.playback.playing = false;
@@ -292,19 +294,13 @@ impl ExperimentsTab {
         for (variant, _) in comparison.recorded() {
             legend_ui(ui, variant.title(settings.scenario), colors.runs[variant as usize]);
         }
-        if comparison.signals(self.degrees).iter().any(|signal| signal.has_target) {
+        if comparison.signals(false).iter().any(|signal| signal.has_target) {
             legend_ui(ui, "target", colors.reference);
         }
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-            if settings.scenario.on_ground() {
-                ui.scope(|ui| {
-                    let choices = [(true, "deg", "Pitch in degrees"), (false, "rad", "Pitch in radians")];
-                    choice_ui(ui, &mut self.degrees, &choices);
-                });
-            }
             if ui.button("Whole run").on_hover_text("Show the run from start to end (double click)").clicked()
             {
-                self.plots.view.show_all(self.marks.limits);
+                self.plots.stack.view.show_all(self.marks.limits);
             }
         });
     }

@@ -60,8 +60,8 @@ impl Playback {
         self.playing &= marks.cursor < marks.limits[1];
     }
 
-    /// Space and the arrows, unless a control has the keyboard.
-    pub(super) fn keys(&mut self, ui: &Ui, marks: &mut Marks) {
+    /// Space and, if they are free, the arrows, unless a control has the keyboard.
+    pub(super) fn keys(&mut self, ui: &Ui, arrows: bool, marks: &mut Marks) {
         if ui.ctx().egui_wants_keyboard_input() {
             return;
         }
@@ -70,7 +70,7 @@ impl Playback {
         if presses(Modifiers::NONE, Key::Space) % 2 == 1 {
             self.toggle(marks);
         }
-        for (modifiers, step_s) in STEPS_S {
+        for (modifiers, step_s) in STEPS_S.into_iter().filter(|_| arrows) {
             for (key, sign) in [(Key::ArrowLeft, -1.0), (Key::ArrowRight, 1.0)] {
                 let count = presses(modifiers, key);
                 if count > 0 {

@@ -2,11 +2,8 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, channel};
-use std::time::{Duration, Instant};
 
-use eframe::icon_data::IconDataExt;
-use egui::{ColorImage, Context, IconData, Rect, TextEdit, Ui};
+use egui::{Context, Rect, TextEdit, Ui};
 use flqr_core::record::write_log;
 
 use super::report;
@@ -14,11 +11,9 @@ use super::runs::Comparison;
 use crate::command::{Command, FilePurpose};
 use crate::context::ViewContext;
 use crate::job::{Job, Outcome, Waker};
+use crate::picture::Shot;
 use crate::widgets::{choice_ui, error_ui, hint_ui, section_ui, warning_ui};
 use crate::write_file::write_file;
-
-/// A window system that has not brought a picture after this time never will.
-const LONGEST_WAIT: Duration = Duration::from_secs(5);
 
 /// What is saved.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -82,22 +77,12 @@ struct Overwrite {
     existing: Vec<PathBuf>,
 }
 
-/// A picture that was asked for.
-struct Shot {
-    path: PathBuf,
-    replace: bool,
-    asked: Instant,
-    image: Receiver<Arc<ColorImage>>,
-    page: Rect,
-    pixels_per_point: f32,
-}
-
 /// Form and jobs.
 #[derive(Default)]
 pub(super) struct Saver {
     pub(super) saved_as: SavedAs,
     path: String,
-    shot: Option<Shot>,
+    shot: Option<(PathBuf, bool, Shot)>,
     job: Option<Job<(), Result<Saved, String>>>,
     /// What the running job would replace, and what it was asked with.
     asked: Option<(SavedAs, PathBuf)>,
@@ -131,9 +116,7 @@ impl Saver {
         self.overwrite = None;
         self.asked = Some((saved_as, path.clone()));
         if saved_as == SavedAs::Picture {
-            let pixels_per_point = ctx.pixels_per_point();
-            let image = ask_for_picture(ctx);
-            self.shot = Some(Shot { path, replace, asked: Instant::now(), image, page, pixels_per_point });
+            self.shot = Some((path, replace, Shot::ask(ctx, page)));
             return Ok(());
         }
         let comparison = Arc::clone(comparison);
@@ -153,19 +136,16 @@ impl Saver {
 
     /// A sentence when something was written, or could not be.
     pub(super) fn drain(&mut self, waker: &Waker) -> Option<Result<String, String>> {
-        if let Some(shot) = self.shot.take() {
-            match shot.image.try_recv() {
-                Ok(image) => {
-                    let Shot { path, replace, page, pixels_per_point, .. } = shot;
-                    let png = move || Ok(vec![(path, png(&image, page, pixels_per_point)?)]);
+        if let Some((path, replace, shot)) = self.shot.take() {
+            match shot.poll() {
+                Some(Ok(picture)) => {
+                    let png = move || Ok(vec![(path, picture.png()?)]);
                     if let Err(problem) = self.write(waker, replace, png) {
                         return Some(Err(problem));
                     }
                 }
-                Err(_) if shot.asked.elapsed() > LONGEST_WAIT => {
-                    return Some(Err("The window system brought no picture of the page.".to_owned()));
-                }
-                Err(_) => self.shot = Some(shot),
+                Some(Err(problem)) => return Some(Err(problem)),
+                None => self.shot = Some((path, replace, shot)),
             }
         }
         let result = match self.job.as_mut()?.poll().1 {
@@ -287,19 +267,6 @@ fn with_ending(path: PathBuf, saved_as: SavedAs) -> PathBuf {
     name.into()
 }
 
-fn ask_for_picture(ctx: &Context) -> Receiver<Arc<ColorImage>> {
-    let (sender, receiver) = channel();
-    let wake = ctx.clone();
-    ctx.request_screenshot(move |image| {
-        // An error means that the window no longer waits for it.
-        sender.send(image).ok();
-        wake.request_repaint();
-    });
-    // So that the wait ends by itself.
-    ctx.request_repaint_after(LONGEST_WAIT + Duration::from_millis(100));
-    receiver
-}
-
 /// What goes where.
 fn files(
     saved_as: SavedAs,
@@ -354,37 +321,9 @@ fn write_all(files: Vec<(PathBuf, Vec<u8>)>, replace: bool) -> Result<Saved, Str
     Ok(Saved::Written(written))
 }
 
-/// The page's part of a picture of the window, as PNG.
-fn png(image: &ColorImage, page: Rect, pixels_per_point: f32) -> Result<Vec<u8>, String> {
-    let whole = egui::vec2(image.width() as f32, image.height() as f32) / pixels_per_point;
-    let part = page.intersect(Rect::from_min_size(egui::Pos2::ZERO, whole));
-    let part = if part.is_positive() {
-        image.region(&part, Some(pixels_per_point))
-    } else {
-        image.region_by_pixels([0, 0], image.size)
-    };
-    let rgba = part.pixels.iter().flat_map(egui::Color32::to_srgba_unmultiplied).collect();
-    let picture = IconData { rgba, width: part.width() as u32, height: part.height() as u32 };
-    picture.to_png_bytes().map_err(|error| format!("the picture could not be encoded: {error}"))
-}
-
 #[cfg(test)]
 mod tests {
-    use egui::{Color32, pos2};
-
     use super::*;
-
-    #[test]
-    fn the_picture_is_the_pages_part_of_the_window() {
-        let pixels = (0..12).map(|i| Color32::from_gray(20 * i)).collect();
-        let image = ColorImage::new([4, 3], pixels);
-        let page = Rect::from_min_max(pos2(1.0, 0.5), pos2(2.0, 9.0));
-        let read = eframe::icon_data::from_png_bytes(&png(&image, page, 2.0).unwrap()).unwrap();
-        assert_eq!((read.width, read.height), (2, 2));
-        assert_eq!(read.rgba.chunks(4).map(|c| c[0]).collect::<Vec<_>>(), [120, 140, 200, 220]);
-        let nowhere = Rect::from_min_max(pos2(50.0, 50.0), pos2(60.0, 60.0));
-        assert_eq!(eframe::icon_data::from_png_bytes(&png(&image, nowhere, 2.0).unwrap()).unwrap().width, 4);
-    }
 
     #[test]
     fn the_ending_is_that_of_what_is_saved() {

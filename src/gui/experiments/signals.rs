@@ -1,6 +1,7 @@
 //! What is plotted and summed up of a run, in the order of its columns.
 
 use crate::history::Channel;
+use crate::plot::Unit;
 use crate::quantity::Quantity;
 
 /// A signal of the runs.
@@ -9,6 +10,8 @@ pub(super) struct Signal {
     /// Name in JSON, with the core's unit.
     pub(super) key: &'static str,
     pub(super) quantity: Quantity,
+    /// Unit of its values.
+    pub(super) unit: Unit,
     /// Whether the target speed belongs into its plot.
     pub(super) has_target: bool,
 }
@@ -17,12 +20,28 @@ pub(super) struct Signal {
 pub(super) fn signals(on_ground: bool, shafts: usize, degrees: bool) -> Vec<Signal> {
     if on_ground {
         let keys = ["x_m", "x_dot_m_s", "pitch_rad"];
-        let signal =
-            |(key, channel)| Signal { key, quantity: Quantity::of(channel, degrees), has_target: false };
-        return keys.into_iter().zip(Channel::ALL).map(signal).collect();
+        let signal = |(key, channel)| {
+            let unit = if channel == Channel::Pitch {
+                Unit::Angle
+            } else {
+                Unit::Plain(Quantity::of(channel, false).unit)
+            };
+            Signal { key, quantity: Quantity::of(channel, degrees), unit, has_target: false }
+        };
+        return keys.into_iter().zip(Channel::STATE).map(signal).collect();
     }
-    let speed = |key, name| Signal { key, quantity: Quantity::plain(name, "rad/s", 0.1), has_target: true };
-    let torque = |key, name| Signal { key, quantity: Quantity::plain(name, "N m", 0.01), has_target: false };
+    let speed = |key, name| Signal {
+        key,
+        quantity: Quantity::plain(name, "rad/s", 0.1),
+        unit: Unit::AngularSpeed,
+        has_target: true,
+    };
+    let torque = |key, name| Signal {
+        key,
+        quantity: Quantity::plain(name, "N m", 0.01),
+        unit: Unit::Torque(None),
+        has_target: false,
+    };
     if shafts == 1 {
         return vec![speed("motor_speed_rad_s", "speed"), torque("torque_nm", "torque")];
     }

@@ -138,7 +138,7 @@ impl FrictionTab {
             let half = 0.5 * ui.available_height();
             ui.allocate_ui(egui::vec2(ui.available_width(), half), |ui| {
                 ui.set_min_height(half);
-                self.preview.ui(&self.loader, ui);
+                self.preview.ui(context, &self.loader, ui);
             });
             let kind = self.loader.log().and_then(|loaded| loaded.kind.as_ref().ok().copied());
             charts::ui(context, &self.fit, kind, ui);

@@ -3,8 +3,9 @@
 use egui::{ComboBox, RichText, ScrollArea, Ui};
 use flqr_core::record::LogKind;
 
+use crate::context::ViewContext;
 use crate::load::{LoadedLog, Loader};
-use crate::plot::{Curve, DecimationCache, TimeCurve, TimePlot, TimeView};
+use crate::plot::{Data, Panel, PanelCurve, Stack, Unit};
 use crate::theme::palette;
 use crate::widgets::{choice_ui, hint_ui, mono, section_ui, shown};
 
@@ -20,26 +21,19 @@ enum Show {
 pub(super) struct Preview {
     show: Show,
     column: Option<usize>,
-    view: TimeView,
+    stack: Stack,
     /// The log that the view was fitted to.
     fitted_to: u64,
-    cache: DecimationCache,
 }
 
 impl Default for Preview {
     fn default() -> Self {
-        Self {
-            show: Show::Plot,
-            column: None,
-            view: TimeView::following(1.0),
-            fitted_to: 0,
-            cache: DecimationCache::default(),
-        }
+        Self { show: Show::Plot, column: None, stack: Stack::new("log", 1.0), fitted_to: 0 }
     }
 }
 
 impl Preview {
-    pub(super) fn ui(&mut self, loader: &Loader, ui: &mut Ui) {
+    pub(super) fn ui(&mut self, context: &ViewContext<'_>, loader: &Loader, ui: &mut Ui) {
         section_ui(ui, "Measured", |ui| {
             if let Some(loaded) = loader.log() {
                 self.controls_ui(loaded, ui);
@@ -51,7 +45,7 @@ impl Preview {
         };
         hint_ui(ui, summary(loaded));
         match self.show {
-            Show::Plot => self.plot_ui(loaded, ui),
+            Show::Plot => self.plot_ui(context, loaded, ui),
             Show::Rows => rows_ui(loaded, ui),
         }
     }
@@ -87,39 +81,36 @@ impl Preview {
         self.column.filter(|column| *column < loaded.log.columns.len()).unwrap_or_else(first)
     }
 
-    fn plot_ui(&mut self, loaded: &LoadedLog, ui: &mut Ui) {
+    fn plot_ui(&mut self, context: &ViewContext<'_>, loaded: &LoadedLog, ui: &mut Ui) {
         let column = self.column(loaded);
         let Some(column_data) = loaded.log.columns.get(column) else { return };
         let axis = &loaded.axis.values;
         let data = [axis.first().copied().unwrap_or(0.0), axis.last().copied().unwrap_or(1.0)];
         if self.fitted_to != loaded.generation {
             self.fitted_to = loaded.generation;
-            self.view.show_all(data);
+            self.stack.show_all(data);
         }
-        self.view.follow = false;
-        self.view.update(data);
-        let plot = TimePlot {
-            id: "preview",
-            label: &column_data.name,
-            height: ui.available_height() - 24.0,
-            x_label: Some(loaded.axis.label),
-            min_y_span: 1e-6,
+        self.stack.update(data);
+        self.stack.x = if loaded.axis.label == "row" { ["row", "row"] } else { ["time [s]", "time_s"] };
+        let curve = PanelCurve {
+            name: "".into(),
+            key: (&column_data.name).into(),
+            color: palette(ui.visuals()).channels[0],
+            data: Data::Fixed(axis, &column_data.values),
+            // A log has fewer than 2^16 columns; the pair identifies the data.
+            generation: (loaded.generation << 16) | column as u64,
+            gap: loaded.axis.gap,
         };
-        let curve = Curve { x: axis, y: &column_data.values, scale: 1.0, gap: loaded.axis.gap };
-        // A log has fewer than 2^16 columns; the pair identifies the data.
-        let generation = (loaded.generation << 16) | column as u64;
-        let color = palette(ui.visuals()).channels[0];
-        let line = TimeCurve { color, curve, generation, cache: &mut self.cache };
-        if let Some(s) = plot.show(ui, &mut self.view, &mut [line])[0] {
-            let text = format!(
-                "visible: mean {}, std {}, peak to peak {}, {} samples",
-                shown(s.mean, 4),
-                shown(s.std, 4),
-                shown(s.peak_to_peak(), 4),
-                s.count
-            );
-            ui.label(RichText::new(text).small().monospace());
-        }
+        let panel = Panel {
+            name: (&column_data.name).into(),
+            unit: Unit::Plain(""),
+            min_span: 1e-6,
+            shown: true,
+            curves: vec![curve],
+            limits: Vec::new(),
+        };
+        ui.horizontal_wrapped(|ui| self.stack.tools_ui(ui, std::slice::from_ref(&panel)));
+        self.stack.show(ui, &[panel]).send(context.commands);
     }
 }
 

@@ -1,6 +1,6 @@
 //! One look for all axes: round grid values, quiet lines, labels with units.
 
-use egui::{Color32, FontId, Rangef, Visuals};
+use egui::{Color32, FontId, Rangef, RichText, Visuals};
 use egui_plot::{AxisHints, GridInput, GridMark, HPlacement, Plot};
 
 /// Width kept for a vertical axis, so that stacked plots line up.
@@ -15,9 +15,69 @@ pub(crate) struct Axes<'a> {
     pub(crate) y_lines: f64,
 }
 
+/// What few plots have.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Extras {
+    /// What is at the right; room is kept for it where only other plots of the stack have one.
+    pub(super) right: Right,
+    /// The vertical values are logarithms to the base of ten.
+    pub(super) logarithmic: bool,
+}
+
+/// What is at the right of a plot.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) enum Right {
+    /// The plot reaches to its edge.
+    #[default]
+    Nothing,
+    /// As much room as an axis takes.
+    Room,
+    /// A second vertical axis of its own scale.
+    Axis(SecondAxis),
+}
+
+/// A second vertical axis: where the first one shows `y`, it shows `(y − first) · scale + second`.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct SecondAxis {
+    label: String,
+    color: Color32,
+    first: f64,
+    second: f64,
+    scale: f64,
+}
+
+impl SecondAxis {
+    /// An axis that shows `range` where the first one shows `left`, with round values at the first one's `lines`.
+    pub(super) fn new(label: String, color: Color32, range: [f64; 2], left: [f64; 2], lines: f64) -> Self {
+        let step = round_step((left[1] - left[0]) / lines);
+        let count = ((left[1] - left[0]) / step - 1.0).max(1.5);
+        let own_step = round_step((range[1] - range[0]) / count);
+        let middle = |ends: [f64; 2], step: f64| ((0.5 * ends[0] + 0.5 * ends[1]) / step).round() * step;
+        let scale = own_step / step;
+        Self { label, color, first: middle(left, step), second: middle(range, own_step), scale }
+    }
+
+    /// Where a value of this axis is on the first one.
+    pub(super) fn place(&self, value: f64) -> f64 {
+        (value - self.second) / self.scale + self.first
+    }
+
+    fn value(&self, place: f64) -> f64 {
+        (place - self.first) * self.scale + self.second
+    }
+}
+
 impl<'a> Axes<'a> {
     /// Gives a plot these axes.
     pub(crate) fn on<'p>(&self, plot: Plot<'p>, visuals: &Visuals) -> Plot<'p>
+    where
+        'a: 'p,
+    {
+        self.with(&Extras::default(), plot, visuals)
+    }
+
+    /// Gives a plot these axes and more.
+    pub(super) fn with<'p>(&self, extras: &Extras, plot: Plot<'p>, visuals: &Visuals) -> Plot<'p>
     where
         'a: 'p,
     {
@@ -28,18 +88,60 @@ impl<'a> Axes<'a> {
                 .tick_label_font(FontId::proportional(11.5))
                 .formatter(|mark, _| tick(mark.value, mark.step_size))
         };
-        let (x_lines, y_lines) = (self.x_lines, self.y_lines);
+        let (x_lines, y_lines, logarithmic) = (self.x_lines, self.y_lines, extras.logarithmic);
         let x = hints(AxisHints::new_x(), self.x_label.unwrap_or_default(), Rangef::new(24.0, 30.0));
         let y = hints(AxisHints::new_y(), self.y_label, Rangef::new(12.0, 16.0))
             .placement(HPlacement::Left)
             .min_thickness(Y_AXIS_WIDTH);
+        let y = if logarithmic { y.formatter(|mark, _| power_of_ten(mark.value)) } else { y };
+        let mut y_axes = vec![y];
+        y_axes.extend(right_axis(&extras.right));
         plot.custom_x_axes(vec![x])
-            .custom_y_axes(vec![y])
+            .custom_y_axes(y_axes)
             .show_axes([self.x_label.is_some(), true])
             .x_grid_spacer(move |input| round_marks(input, x_lines))
-            .y_grid_spacer(move |input| round_marks(input, y_lines))
+            .y_grid_spacer(move |input| {
+                let marks = round_marks(input, y_lines);
+                if logarithmic {
+                    marks.into_iter().filter(|mark| mark.value.fract() == 0.0).collect()
+                } else {
+                    marks
+                }
+            })
             .grid_color(grid_color(visuals))
     }
+}
+
+fn right_axis<'p>(right: &Right) -> Option<AxisHints<'p>> {
+    let hints = AxisHints::new_y()
+        .placement(HPlacement::Right)
+        .label_spacing(Rangef::new(12.0, 16.0))
+        .tick_label_font(FontId::proportional(11.5))
+        .min_thickness(Y_AXIS_WIDTH);
+    match right {
+        Right::Nothing => None,
+        Right::Room => Some(hints.formatter(|_, _| String::new())),
+        Right::Axis(axis) => {
+            let label = RichText::new(&axis.label).color(axis.color);
+            let axis = axis.clone();
+            let hints = hints.label(label).tick_label_color(axis.color);
+            Some(hints.formatter(move |mark, _| tick(axis.value(mark.value), mark.step_size * axis.scale)))
+        }
+    }
+}
+
+fn power_of_ten(exponent: f64) -> String {
+    match exponent {
+        _ if exponent.fract() != 0.0 => String::new(),
+        -3.0..=3.0 => tick(10.0_f64.powf(exponent), 10.0_f64.powf(exponent)),
+        _ => format!("1e{exponent:.0}").replace('-', "−"),
+    }
+}
+
+/// The smallest of 1, 2 and 5 times a power of ten that is not below `rough`.
+fn round_step(rough: f64) -> f64 {
+    let power = 10.0_f64.powf(rough.log10().floor());
+    [1.0, 2.0, 5.0].into_iter().map(|m| m * power).find(|step| *step >= rough).unwrap_or(10.0 * power)
 }
 
 /// Grid marks at round values (1, 2 or 5 times a power of ten), about `count` of them, none at the very
@@ -50,9 +152,7 @@ fn round_marks(input: GridInput, count: f64) -> Vec<GridMark> {
     if !(rough.is_finite() && rough > 0.0) {
         return Vec::new();
     }
-    let power = 10.0_f64.powf(rough.log10().floor());
-    let step_size =
-        [1.0, 2.0, 5.0].into_iter().map(|m| m * power).find(|s| *s >= rough).unwrap_or(10.0 * power);
+    let step_size = round_step(rough);
     let edge = 0.035 * (high - low);
     let first = ((low + edge) / step_size).ceil();
     let last = ((high - edge) / step_size).floor();
@@ -90,6 +190,26 @@ mod tests {
         assert_eq!(marks((-0.2, 0.2)), ["−0.1", "0.0", "0.1"]);
         assert!(marks((1.0, 1.0)).is_empty());
         assert!(marks((f64::NEG_INFINITY, 1.0)).is_empty());
+    }
+
+    #[test]
+    fn a_second_axis_has_round_values_at_the_lines_of_the_first_and_room_for_its_range() {
+        for (range, left) in
+            [([-0.3, 0.4], [-1.0, 2.0]), ([1e3, 1.7e3], [0.0, 0.013]), ([2.0, 2.1], [-7.0, 9.0])]
+        {
+            let axis = SecondAxis::new(String::new(), Color32::WHITE, range, left, 5.0);
+            let bounds = (left[0], left[1]);
+            for mark in round_marks(GridInput { bounds, base_step_size: 1.0 }, 5.0) {
+                let (value, step) = (axis.value(mark.value), mark.step_size * axis.scale);
+                assert!((value / step - (value / step).round()).abs() < 1e-6, "{value} in steps of {step}");
+                assert!((axis.place(value) - mark.value).abs() < 1e-9 * mark.step_size);
+            }
+            for end in range {
+                let place = axis.place(end);
+                assert!(place >= left[0] && place <= left[1], "{end} is at {place} of {left:?}");
+            }
+        }
+        assert_eq!(["0.01", "1000", "1e−5", ""].map(str::to_owned), [-2.0, 3.0, -5.0, 0.5].map(power_of_ten));
     }
 
     #[test]

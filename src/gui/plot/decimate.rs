@@ -1,10 +1,16 @@
-//! Min/max decimation: at most two points a pixel column, so that cost and picture do not depend on how
-//! much data is behind them.
+//! What is drawn of a curve: at most two points a pixel column, from its pyramid, so that cost and picture do not
+//! depend on how much data is behind them.
 //!
 //! Awkward values: a sample that is not finite, and a step in time longer than the gap limit, end a piece of
-//! the line; nothing that is not finite ever reaches the plot. Times must not run back.
+//! the line; nothing that is not finite ever reaches the plot. Within one column, what lies between its first and
+//! its last gap is one piece. A curve whose times are not finite or run back is not drawn.
+
+use std::ops::Range;
 
 use egui_plot::PlotPoint;
+
+use super::column::{TimeColumn, ValueColumn, Values};
+use super::pyramid::{Extremes, Gaps, Pyramid, Steps, Summary};
 
 /// Data of one curve.
 #[derive(Clone, Copy, Debug)]
@@ -17,6 +23,15 @@ pub struct Curve<'a> {
     pub scale: f64,
     /// A larger step in `x` is drawn as a gap.
     pub gap: f64,
+}
+
+/// Where the data of a curve are.
+#[derive(Clone, Copy, Debug)]
+pub enum Data<'a> {
+    /// Columns that stay while their generation does: horizontal values and as many vertical ones.
+    Fixed(&'a [f64], &'a [f64]),
+    /// Columns that grow, with pyramids of their own.
+    Growing(&'a TimeColumn, &'a ValueColumn),
 }
 
 /// What is visible of a curve.
@@ -48,13 +63,200 @@ impl RangeStatistics {
     pub fn peak_to_peak(&self) -> f64 {
         self.max - self.min
     }
+
+    /// Root of the mean square.
+    pub fn rms(&self) -> f64 {
+        self.mean.hypot(self.std)
+    }
+
+    fn new(summary: &Summary, scale: f64) -> Self {
+        let Extremes { min, max, .. } = summary.extremes;
+        let ends = [min * scale, max * scale];
+        Self {
+            count: summary.count,
+            min: ends[0].min(ends[1]),
+            max: ends[0].max(ends[1]),
+            mean: summary.mean * scale,
+            std: (summary.squares / summary.count as f64).sqrt() * scale.abs(),
+        }
+    }
 }
 
-/// The decimated picture of one curve, kept until data, range or width change.
+/// A curve with its pyramids: every question about it costs the same however long it is.
+#[derive(Clone, Copy)]
+pub(super) struct Indexed<'a> {
+    gaps: Gaps<'a>,
+    scale: f64,
+    length: usize,
+}
+
+impl<'a> Indexed<'a> {
+    fn new(gaps: Gaps<'a>, scale: f64) -> Self {
+        let length = gaps.x.len().min(gaps.y.len());
+        Self { gaps, scale, length: if gaps.steps.are_sound() { length } else { 0 } }
+    }
+
+    /// A curve of columns that grow.
+    pub(super) fn growing(x: &'a TimeColumn, y: &'a ValueColumn, scale: f64, gap: f64) -> Self {
+        let (steps, pyramid) = (&x.steps, &y.pyramid);
+        let (x, y) = (Values::Chunks(&x.values), Values::Chunks(&y.values));
+        Self::new(Gaps { x, steps, y, pyramid, longest: gap }, scale)
+    }
+
+    /// Number of samples.
+    pub(super) fn len(&self) -> usize {
+        self.length
+    }
+
+    /// Time of a sample.
+    pub(super) fn x(&self, index: usize) -> f64 {
+        self.gaps.x.at(index)
+    }
+
+    /// A sample as it is shown.
+    pub(super) fn y(&self, index: usize) -> f64 {
+        self.gaps.y.at(index) * self.scale
+    }
+
+    /// The samples from `range[0]` to `range[1]`, both included.
+    pub(super) fn inside(&self, range: [f64; 2]) -> Range<usize> {
+        let start = self.gaps.x.partition_point(0..self.length, |x| x < range[0]);
+        start..self.gaps.x.partition_point(start..self.length, |x| x <= range[1])
+    }
+
+    /// Statistics of the finite samples.
+    pub(super) fn statistics(&self, range: Range<usize>) -> Option<RangeStatistics> {
+        let summary = self.gaps.pyramid.summary(self.gaps.y, range)?;
+        Some(RangeStatistics::new(&summary, self.scale))
+    }
+
+    /// The sample that holds at a time: the last one not later; none before the first and beyond a gap.
+    pub(super) fn held_at(&self, x: f64) -> Option<usize> {
+        let index = self.gaps.x.partition_point(0..self.length, |other| other <= x).checked_sub(1)?;
+        (x - self.x(index) <= self.gaps.longest && self.y(index).is_finite()).then_some(index)
+    }
+
+    /// The sample nearest to a time; none of an empty curve.
+    pub(super) fn nearest(&self, x: f64) -> Option<usize> {
+        let after = self.gaps.x.partition_point(0..self.length, |other| other < x);
+        let before = after
+            .checked_sub(1)
+            .filter(|before| after == self.length || x - self.x(*before) <= self.x(after) - x);
+        before.or((after < self.length).then_some(after))
+    }
+
+    /// The last sample of a range that is shown outside of `band`.
+    pub(super) fn last_outside(&self, range: Range<usize>, band: [f64; 2]) -> Option<usize> {
+        let ends = band.map(|end| end / self.scale);
+        let ends = [ends[0].min(ends[1]), ends[0].max(ends[1])];
+        self.gaps.pyramid.last_outside(self.gaps.y, range, ends)
+    }
+
+    /// The longest part of a range without a gap.
+    pub(super) fn longest_run(&self, range: Range<usize>) -> Range<usize> {
+        let (mut best, mut start) = (range.start..range.start, range.start);
+        while start < range.end {
+            let gap = self.gaps.first(start..range.end).unwrap_or(range.end);
+            if gap - start > best.len() {
+                best = start..gap;
+            }
+            // What is no number is left out; what follows a gap begins the next part.
+            let is_hole = gap < range.end && !self.gaps.y.at(gap).is_finite();
+            start = gap + usize::from(is_hole || gap == start);
+        }
+        best
+    }
+
+    /// What is drawn between `range[0]` and `range[1]` in a plot of `columns` pixels.
+    pub(super) fn visible(&self, range: [f64; 2], columns: usize) -> Visible {
+        let valid = range[0].is_finite() && range[1].is_finite() && range[1] > range[0] && columns > 0;
+        if self.length == 0 || !valid {
+            return Visible::default();
+        }
+        let inside = self.inside(range);
+        // One sample beyond each end keeps the line going to the edge of the plot.
+        let drawn = inside.start.saturating_sub(1)..(inside.end + 1).min(self.length);
+        let statistics = self.statistics(inside);
+        let mut pieces = Pieces::default();
+        if drawn.len() <= 2 * columns {
+            for index in drawn.clone() {
+                if index > drawn.start && self.gaps.is_before(index) {
+                    pieces.end();
+                }
+                pieces.sample(self, index);
+            }
+        } else {
+            self.by_columns(drawn, (range[1] - range[0]) / columns as f64, &mut pieces);
+        }
+        pieces.end();
+        Visible { pieces: pieces.done, statistics }
+    }
+
+    /// Columns start at whole multiples of their width, so that the picture of old samples does not flicker while
+    /// the range follows new ones.
+    fn by_columns(&self, drawn: Range<usize>, width: f64, pieces: &mut Pieces) {
+        let (mut start, mut guess) = (drawn.start, 1);
+        let mut gap = self.gaps.first(drawn.clone());
+        while start < drawn.end {
+            let limit = ((self.x(start) / width).floor() + 1.0) * width;
+            let end = self.next_column(start, drawn.end, limit, guess);
+            guess = end - start;
+            if gap.is_some_and(|gap| gap < end) {
+                if start > drawn.start && self.gaps.is_before(start) {
+                    pieces.end();
+                }
+                self.column(start..end, pieces);
+                gap = self.gaps.first_from(end..drawn.end);
+            } else {
+                pieces.extremes(self, start..end);
+            }
+            start = end;
+        }
+    }
+
+    /// The first sample after `start` that is not below `limit`: about `guess` samples on, as a rule.
+    fn next_column(&self, start: usize, end: usize, limit: f64, guess: usize) -> usize {
+        let below = |index: usize| self.x(index) < limit;
+        let (mut low, mut high, mut reach) = (start + 1, (start + guess).clamp(start + 1, end), 1);
+        if high < end && below(high) {
+            low = high + 1;
+            while low + reach < end && below(low + reach) {
+                low += reach + 1;
+                reach *= 2;
+            }
+            high = (low + reach).min(end);
+        } else {
+            while high - low > reach && !below(high - reach) {
+                high -= reach;
+                reach *= 2;
+            }
+            if high - low > reach {
+                low = high - reach + 1;
+            }
+        }
+        self.gaps.x.partition_point(low..high, |x| x < limit)
+    }
+
+    fn column(&self, range: Range<usize>, pieces: &mut Pieces) {
+        let Some(first) = self.gaps.first(range.clone()) else { return pieces.extremes(self, range) };
+        pieces.extremes(self, range.start..first);
+        pieces.end();
+        let last = self.gaps.last(range.clone()).unwrap_or(first);
+        pieces.extremes(self, first..last);
+        pieces.end();
+        pieces.extremes(self, last..range.end);
+    }
+}
+
+/// The picture and the pyramids of one curve, kept until data, range or width change.
 #[derive(Default)]
 pub struct DecimationCache {
-    key: Option<(u64, [u64; 3], usize)>,
+    key: Option<(u64, [u64; 4], usize)>,
     visible: Visible,
+    /// Of columns that stay: the generation that the pyramids are of.
+    of: Option<(u64, usize)>,
+    steps: Steps,
+    pyramid: Pyramid,
 }
 
 impl DecimationCache {
@@ -67,159 +269,98 @@ impl DecimationCache {
         range: [f64; 2],
         columns: usize,
     ) -> &Visible {
-        let bits = [range[0], range[1], curve.scale].map(f64::to_bits);
+        let Curve { x, y, scale, gap } = curve;
+        self.visible_of(Data::Fixed(x, y), [scale, gap], generation, range, columns)
+    }
+
+    /// The same of any data; `look` is the scale and the largest step that is no gap.
+    pub(super) fn visible_of(
+        &mut self,
+        data: Data<'_>,
+        look: [f64; 2],
+        generation: u64,
+        range: [f64; 2],
+        columns: usize,
+    ) -> &Visible {
+        let bits = [range[0], range[1], look[0], look[1]].map(f64::to_bits);
         let key = Some((generation, bits, columns));
         if self.key != key {
             self.key = key;
-            self.visible = decimate(curve, range, columns);
+            self.visible = self.indexed(data, look, generation).visible(range, columns);
         }
         &self.visible
+    }
+
+    /// What was visible when it was asked for last.
+    pub(super) fn last_visible(&self) -> &Visible {
+        &self.visible
+    }
+
+    /// The curve with its pyramids, which are made here for columns that have none.
+    pub(super) fn indexed<'a>(
+        &'a mut self,
+        data: Data<'a>,
+        [scale, gap]: [f64; 2],
+        generation: u64,
+    ) -> Indexed<'a> {
+        match data {
+            Data::Growing(x, y) => Indexed::growing(x, y, scale, gap),
+            Data::Fixed(x, y) => {
+                let (x, y) = (Values::Slice(x), Values::Slice(y));
+                let of = Some((generation, x.len()));
+                if self.of != of {
+                    (self.of, self.steps, self.pyramid) = (of, Steps::of(x), Pyramid::of(y));
+                }
+                let (steps, pyramid) = (&self.steps, &self.pyramid);
+                Indexed::new(Gaps { x, steps, y, pyramid, longest: gap }, scale)
+            }
+        }
     }
 }
 
 /// The visible part of a curve; see [`Curve`].
 pub fn decimate(curve: Curve<'_>, range: [f64; 2], columns: usize) -> Visible {
-    let length = curve.x.len().min(curve.y.len());
-    let valid = range[0].is_finite() && range[1].is_finite() && range[1] > range[0] && columns > 0;
-    if length == 0 || !valid {
-        return Visible::default();
-    }
-    let inside = curve.x[..length].partition_point(|&x| x < range[0])
-        ..curve.x[..length].partition_point(|&x| x <= range[1]);
-    // One sample beyond each end keeps the line going to the edge of the plot.
-    let drawn = inside.start.saturating_sub(1)..(inside.end + 1).min(length);
-    let statistics = statistics(&curve.y[inside], curve.scale);
-    let column_width = column_width(range, columns, drawn.len());
-    let mut pieces = Pieces::new(column_width);
-    for index in drawn {
-        pieces.push(curve.x[index], curve.y[index] * curve.scale, curve.gap);
-    }
-    Visible { pieces: pieces.finish(), statistics }
+    DecimationCache::default().visible(curve, 0, range, columns).clone()
 }
 
-/// Width of a column in data units; 0 draws each sample. Columns start at whole multiples of their width, so
-/// that the picture of old samples does not flicker while the range follows new ones.
-fn column_width(range: [f64; 2], columns: usize, samples: usize) -> f64 {
-    if samples <= 2 * columns { 0.0 } else { (range[1] - range[0]) / columns as f64 }
-}
-
-fn statistics(values: &[f64], scale: f64) -> Option<RangeStatistics> {
-    let (mut count, mut min, mut max) = (0_usize, f64::INFINITY, f64::NEG_INFINITY);
-    // Sums about the first value, in one pass: no digits are lost to a large mean.
-    let shift = values.iter().copied().find(|value| value.is_finite())?;
-    let (mut sum, mut squares) = (0.0, 0.0);
-    for value in values.iter().filter(|value| value.is_finite()) {
-        let moved = value - shift;
-        count += 1;
-        sum += moved;
-        squares += moved * moved;
-        min = min.min(*value);
-        max = max.max(*value);
-    }
-    let mean = sum / count as f64;
-    let variance = (squares / count as f64 - mean * mean).max(0.0);
-    let ends = [min * scale, max * scale];
-    Some(RangeStatistics {
-        count,
-        min: ends[0].min(ends[1]),
-        max: ends[0].max(ends[1]),
-        mean: (shift + mean) * scale,
-        std: variance.sqrt() * scale.abs(),
-    })
-}
-
-/// Builds the pieces column by column.
+/// Pieces of a line while it is put together.
+#[derive(Default)]
 struct Pieces {
-    column_width: f64,
     done: Vec<Vec<PlotPoint>>,
     current: Vec<PlotPoint>,
-    column: Option<Column>,
-}
-
-/// Lowest and highest sample of one column.
-struct Column {
-    /// Where the next column begins.
-    end: f64,
-    last_x: f64,
-    low: PlotPoint,
-    high: PlotPoint,
 }
 
 impl Pieces {
-    fn new(column_width: f64) -> Self {
-        Self { column_width, done: Vec::new(), current: Vec::new(), column: None }
-    }
-
-    fn push(&mut self, x: f64, y: f64, gap: f64) {
-        if !(x.is_finite() && y.is_finite()) {
-            self.end_piece();
-            return;
-        }
-        if self.last_x().is_some_and(|last| x - last > gap) {
-            self.end_piece();
-        }
-        let point = PlotPoint::new(x, y);
-        if self.column_width == 0.0 {
-            self.current.push(point);
-            return;
-        }
-        match &mut self.column {
-            Some(column) if x < column.end => column.add(point),
-            _ => {
-                self.end_column();
-                let end = ((x / self.column_width).floor() + 1.0) * self.column_width;
-                self.column = Some(Column { end, last_x: x, low: point, high: point });
-            }
-        }
-    }
-
-    fn last_x(&self) -> Option<f64> {
-        self.column.as_ref().map(|column| column.last_x).or_else(|| self.current.last().map(|point| point.x))
-    }
-
-    fn end_column(&mut self) {
-        if let Some(column) = self.column.take() {
-            column.emit(&mut self.current);
-        }
-    }
-
-    fn end_piece(&mut self) {
-        self.end_column();
+    fn end(&mut self) {
         if !self.current.is_empty() {
             self.done.push(std::mem::take(&mut self.current));
         }
     }
 
-    fn finish(mut self) -> Vec<Vec<PlotPoint>> {
-        self.end_piece();
-        self.done
-    }
-}
-
-impl Column {
-    fn add(&mut self, point: PlotPoint) {
-        if point.y < self.low.y {
-            self.low = point;
+    /// One sample; what is no number, or none any more in the unit that is shown, ends the piece.
+    fn sample(&mut self, curve: &Indexed<'_>, index: usize) {
+        let (x, y) = (curve.x(index), curve.y(index));
+        if y.is_finite() {
+            self.current.push(PlotPoint::new(x, y));
+        } else {
+            self.end();
         }
-        if point.y > self.high.y {
-            self.high = point;
-        }
-        self.last_x = point.x;
     }
 
-    /// Both extremes in their order; one point where they are the same.
-    fn emit(self, points: &mut Vec<PlotPoint>) {
-        let (early, late) =
-            if self.low.x <= self.high.x { (self.low, self.high) } else { (self.high, self.low) };
-        points.push(early);
+    /// Both extremes of a range in their order; one point where they are the same.
+    fn extremes(&mut self, curve: &Indexed<'_>, range: Range<usize>) {
+        let Some(found) = curve.gaps.pyramid.extremes(curve.gaps.y, range) else { return };
+        let (early, late) = (found.min_at.min(found.max_at), found.min_at.max(found.max_at));
+        self.sample(curve, early);
         if late != early {
-            points.push(late);
+            self.sample(curve, late);
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::column::CHUNK;
     use super::*;
 
     fn curve<'a>(x: &'a [f64], y: &'a [f64]) -> Curve<'a> {
@@ -242,6 +383,176 @@ mod tests {
         assert_eq!((lowest, highest), (-9.0, 7.0));
         let statistics = visible.statistics.unwrap();
         assert_eq!((statistics.min, statistics.max, statistics.count), (-9.0, 7.0, 60_000));
+    }
+
+    /// A tiny generator: the same numbers in every run.
+    struct Random(u64);
+
+    impl Random {
+        fn below(&mut self, limit: usize) -> usize {
+            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (self.0 >> 33) as usize % limit
+        }
+
+        fn unit(&mut self) -> f64 {
+            self.below(1 << 30) as f64 / f64::from(1 << 30)
+        }
+    }
+
+    /// A random walk with holes, infinities and jumps in time, some of them close together.
+    fn walk(random: &mut Random, length: usize) -> (Vec<f64>, Vec<f64>) {
+        let (mut time, mut value) = (100.0 * random.unit(), 1e3 * random.unit());
+        let holes = [0, 3, 300][random.below(3)];
+        let (mut x, mut y) = (Vec::new(), Vec::new());
+        for _ in 0..length {
+            time += match random.below(2000) {
+                0 => 5.0,
+                1..20 => 0.0,
+                _ => 1e-3 * (0.5 + random.unit()),
+            };
+            value += random.unit() - 0.5;
+            x.push(time);
+            let hole = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY][random.below(3)];
+            y.push(if random.below(2000) < holes { hole } else { value });
+        }
+        (x, y)
+    }
+
+    /// Walks over every sample: columns, then the runs between gaps of each, the inner ones as one.
+    fn brute_force(curve: Curve<'_>, range: [f64; 2], columns: usize) -> Vec<Vec<PlotPoint>> {
+        let Curve { x, y, scale, gap } = curve;
+        let inside: Vec<usize> = (0..x.len()).filter(|&i| x[i] >= range[0] && x[i] <= range[1]).collect();
+        let after = x.iter().filter(|&&x| x < range[0]).count();
+        let (start, end) = (after.saturating_sub(1), (after + inside.len() + 1).min(x.len()));
+        let width = if end - start <= 2 * columns { 0.0 } else { (range[1] - range[0]) / columns as f64 };
+        // A column is the list of its runs; a run is a list of samples.
+        let mut picture: Vec<Vec<Vec<usize>>> = Vec::new();
+        let mut limit = f64::NEG_INFINITY;
+        let mut joined = Vec::new();
+        for i in start..end {
+            let jump = i > start && x[i] - x[i - 1] > gap;
+            if width == 0.0 || x[i] >= limit || i == start {
+                limit = ((x[i] / width).floor() + 1.0) * width;
+                joined.push(i > start && !jump && y[i].is_finite() && y[i - 1].is_finite());
+                picture.push(vec![Vec::new(); if y[i].is_finite() { 1 } else { 2 }]);
+            } else if jump || !y[i].is_finite() {
+                picture.last_mut().unwrap().push(Vec::new());
+            }
+            if y[i].is_finite() {
+                picture.last_mut().unwrap().last_mut().unwrap().push(i);
+            }
+        }
+        let extremes = |run: &[usize]| -> Vec<PlotPoint> {
+            let Some(&first) = run.first() else { return Vec::new() };
+            let low = run.iter().fold(first, |best, &i| if y[i] < y[best] { i } else { best });
+            let high = run.iter().fold(first, |best, &i| if y[i] > y[best] { i } else { best });
+            let mut both = vec![low.min(high), low.max(high)];
+            both.dedup();
+            both.into_iter().map(|i| PlotPoint::new(x[i], y[i] * scale)).collect()
+        };
+        let mut pieces: Vec<Vec<PlotPoint>> = Vec::new();
+        for (column, joined) in picture.iter().zip(joined) {
+            let mut runs = vec![column[0].clone()];
+            if let [_, inner @ .., last] = column.as_slice() {
+                runs.extend([inner.concat(), last.clone()]);
+            }
+            for (number, run) in runs.iter().enumerate() {
+                let points = extremes(run);
+                match pieces.last_mut() {
+                    Some(piece) if number == 0 && joined => piece.extend(points),
+                    _ => pieces.push(points),
+                }
+            }
+        }
+        pieces.retain(|piece| !piece.is_empty());
+        pieces
+    }
+
+    #[test]
+    fn the_pyramid_draws_what_every_sample_alone_would() {
+        let mut random = Random(7);
+        for round in 0..60 {
+            let length = [3, 63, 64, 65, 700, 40_000][random.below(6)];
+            let (x, y) = walk(&mut random, length);
+            let curve = Curve { x: &x, y: &y, scale: [1.0, -57.3][random.below(2)], gap: 0.1 };
+            let (mut time, mut values) = (TimeColumn::default(), ValueColumn::default());
+            // In odd portions, so that blocks are completed in all places.
+            let mut taken = 0;
+            while taken < length {
+                let end = (taken + 1 + random.below(977)).min(length);
+                x[taken..end].iter().for_each(|x| time.push(*x));
+                y[taken..end].iter().for_each(|y| values.push(*y));
+                taken = end;
+            }
+            let growing = Indexed::growing(&time, &values, curve.scale, curve.gap);
+            for _ in 0..8 {
+                let span = x[length - 1] - x[0];
+                let start = x[0] + span * (1.4 * random.unit() - 0.2);
+                let range = [start, start + 1e-3 + span * random.unit() * random.unit()];
+                let columns = 1 + random.below(900);
+                let expected = brute_force(curve, range, columns);
+                let found = decimate(curve, range, columns);
+                assert!(found.pieces == expected, "round {round}, {range:?}, {columns} columns of {length}");
+                assert!(growing.visible(range, columns) == found, "round {round}");
+                let inside =
+                    (0..length).filter(|&i| x[i] >= range[0] && x[i] <= range[1] && y[i].is_finite());
+                let inside: Vec<f64> = inside.map(|i| y[i] * curve.scale).collect();
+                check_statistics(found.statistics, &inside);
+            }
+        }
+    }
+
+    fn check_statistics(found: Option<RangeStatistics>, values: &[f64]) {
+        let Some(found) = found else { return assert!(values.is_empty()) };
+        let count = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / count;
+        let std = (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / count).sqrt();
+        let ends = values.iter().fold([f64::MAX, f64::MIN], |e, v| [e[0].min(*v), e[1].max(*v)]);
+        assert_eq!((found.count, [found.min, found.max]), (values.len(), ends));
+        let size = ends[0].abs().max(ends[1].abs()).max(1.0);
+        assert!((found.mean - mean).abs() <= 1e-11 * size, "{} {mean}", found.mean);
+        assert!((found.std - std).abs() <= 1e-9 * size, "{} {std}", found.std);
+    }
+
+    #[test]
+    fn what_is_dropped_at_the_start_leaves_the_rest_as_it_was() {
+        let mut random = Random(3);
+        let (x, y) = walk(&mut random, 2 * CHUNK + 1234);
+        let (mut time, mut values) = (TimeColumn::default(), ValueColumn::default());
+        x.iter().for_each(|x| time.push(*x));
+        y.iter().for_each(|y| values.push(*y));
+        time.drop_chunk();
+        values.drop_chunk();
+        let curve = Curve { x: &x[CHUNK..], y: &y[CHUNK..], scale: 1.0, gap: 0.1 };
+        let growing = Indexed::growing(&time, &values, 1.0, 0.1);
+        for columns in [50, 777, 40_000] {
+            let range = [x[CHUNK] - 1.0, x[x.len() - 1]];
+            assert_eq!(growing.visible(range, columns), decimate(curve, range, columns));
+        }
+        assert_eq!((time.len(), time.first()), (CHUNK + 1234, Some(x[CHUNK])));
+    }
+
+    #[test]
+    fn the_last_sample_outside_of_a_band_and_the_longest_run_are_found() {
+        let x: Vec<f64> = (0..9000).map(f64::from).collect();
+        let mut y = vec![0.0; 9000];
+        (y[77], y[4567], y[4600]) = (5.0, -5.0, f64::INFINITY);
+        let mut cache = DecimationCache::default();
+        let curve = cache.indexed(Data::Fixed(&x, &y), [2.0, 1.5], 1);
+        assert_eq!(curve.last_outside(0..9000, [-9.0, 9.0]), Some(4567));
+        assert_eq!(curve.last_outside(0..4567, [-9.0, 9.0]), Some(77));
+        assert_eq!(curve.last_outside(78..4567, [-9.0, 9.0]), None);
+        assert_eq!(curve.longest_run(0..9000), 0..4600);
+        assert_eq!(curve.longest_run(1000..9000), 4601..9000);
+        assert_eq!((curve.held_at(77.5), curve.y(77)), (Some(77), 10.0));
+        assert_eq!((curve.held_at(-1.0), curve.held_at(4600.2), curve.held_at(9005.0)), (None, None, None));
+    }
+
+    #[test]
+    fn a_curve_whose_time_runs_back_is_not_drawn() {
+        for x in [[0.0, 2.0, 1.0], [0.0, f64::NAN, 1.0]] {
+            assert_eq!(decimate(curve(&x, &[1.0; 3]), [0.0, 2.0], 10), Visible::default());
+        }
     }
 
     #[test]

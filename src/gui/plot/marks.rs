@@ -4,7 +4,7 @@ use egui::{Color32, CursorIcon, Response, Stroke, Ui};
 use egui_plot::{PlotTransform, PlotUi, Span, VLine};
 
 /// How near to a mark a press takes hold of it, points.
-const REACH: f32 = 6.0;
+pub(super) const REACH: f32 = 6.0;
 
 /// What a drag has hold of.
 #[derive(Clone, Copy, Debug, PartialEq)]

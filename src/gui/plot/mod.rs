@@ -1,11 +1,28 @@
 //! Plots over a shared horizontal range: decimated, following or held, with exact statistics.
 
 mod axes;
+mod column;
+mod cursors;
 mod decimate;
+mod export;
+mod figure;
 mod marks;
+mod pyramid;
+mod readout;
+mod response;
+mod spectra;
+mod spectrum;
+mod stack;
+#[cfg(test)]
+mod tests;
+mod unit;
 mod view;
 
 pub(crate) use axes::Axes;
-pub use decimate::{Curve, DecimationCache, RangeStatistics, Visible, decimate};
+pub use column::{CHUNK, TimeColumn, ValueColumn};
+pub use decimate::{Curve, Data, DecimationCache, RangeStatistics, Visible, decimate};
+pub use export::{FigureFile, FigureKind};
 pub use marks::{Marks, Moved};
-pub use view::{TimeCurve, TimePlot, TimeView};
+pub use stack::{Panel, PanelCurve, Stack, Wishes};
+pub use unit::{Unit, UnitChoice};
+pub use view::{DataCurve, TimeCurve, TimePlot, TimeView};

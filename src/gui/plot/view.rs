@@ -1,11 +1,12 @@
 //! One plot of a stack, and the horizontal range that the stack shares.
 
 use egui::{Color32, Ui};
-use egui_plot::{Line, Plot, PlotPoints, PlotResponse, PlotUi};
+use egui_plot::{HLine, Line, LineStyle, Plot, PlotPoint, PlotPoints, PlotResponse, PlotUi};
 
-use super::axes::{Axes, Y_AXIS_WIDTH};
-use super::decimate::{Curve, DecimationCache, RangeStatistics, Visible};
+use super::axes::{Axes, Extras, Y_AXIS_WIDTH};
+use super::decimate::{Curve, Data, DecimationCache, RangeStatistics, Visible};
 use super::marks::{Marks, Moved};
+use crate::theme::palette;
 
 /// The shortest range that can be zoomed to.
 const MIN_SPAN: f64 = 1e-3;
@@ -92,6 +93,59 @@ pub struct TimeCurve<'a> {
     pub cache: &'a mut DecimationCache,
 }
 
+/// One curve of a plot, wherever its data are.
+pub struct DataCurve<'a> {
+    /// Colour of the line.
+    pub color: Color32,
+    /// Its data.
+    pub data: Data<'a>,
+    /// The plot shows the values times this.
+    pub scale: f64,
+    /// A larger step in time is drawn as a gap.
+    pub gap: f64,
+    /// Changes whenever the data do.
+    pub generation: u64,
+    /// What was drawn last.
+    pub cache: &'a mut DecimationCache,
+}
+
+impl TimeCurve<'_> {
+    fn data(&mut self) -> DataCurve<'_> {
+        let Curve { x, y, scale, gap } = self.curve;
+        let (color, generation) = (self.color, self.generation);
+        DataCurve { color, data: Data::Fixed(x, y), scale, gap, generation, cache: self.cache }
+    }
+}
+
+/// What one plot shows.
+#[derive(Default)]
+pub(super) struct Drawing<'a> {
+    /// Lines with gaps, in the order in which they are drawn.
+    pub(super) lines: Vec<(Color32, &'a [Vec<PlotPoint>])>,
+    pub(super) y_range: [f64; 2],
+    /// Horizontal lines with names.
+    pub(super) limits: Vec<(String, f64)>,
+    pub(super) extras: Extras,
+}
+
+impl<'a> Drawing<'a> {
+    fn of(
+        curves: impl Iterator<Item = DataCurve<'a>>,
+        range: [f64; 2],
+        columns: usize,
+        min_span: f64,
+    ) -> (Self, Vec<Option<RangeStatistics>>) {
+        let drawn = curves.map(|DataCurve { color, data, scale, gap, generation, cache }| {
+            (color, cache.visible_of(data, [scale, gap], generation, range, columns))
+        });
+        let drawn: Vec<(Color32, &Visible)> = drawn.collect();
+        let statistics: Vec<_> = drawn.iter().map(|(_, visible)| visible.statistics).collect();
+        let y_range = y_range(statistics.iter().flatten().map(|s| [s.min, s.max]), min_span);
+        let lines = drawn.into_iter().map(|(color, visible)| (color, visible.pieces.as_slice())).collect();
+        (Self { lines, y_range, ..Self::default() }, statistics)
+    }
+}
+
 impl TimePlot<'_> {
     /// Draws the curves over the view's range, lets the user pan (drag), zoom (wheel) and resume following
     /// (double click), and returns the statistics of what is visible of each curve.
@@ -101,7 +155,18 @@ impl TimePlot<'_> {
         view: &mut TimeView,
         curves: &mut [TimeCurve<'_>],
     ) -> Vec<Option<RangeStatistics>> {
-        let (shown, statistics) = self.draw(ui, view.range(), curves, |_| {});
+        self.show_data(ui, view, curves.iter_mut().map(TimeCurve::data))
+    }
+
+    /// The same of curves whose data may grow.
+    pub fn show_data<'a>(
+        &self,
+        ui: &mut Ui,
+        view: &mut TimeView,
+        curves: impl Iterator<Item = DataCurve<'a>>,
+    ) -> Vec<Option<RangeStatistics>> {
+        let (drawing, statistics) = Drawing::of(curves, view.range(), columns(ui), self.min_y_span);
+        let shown = self.draw(ui, view.range(), &drawing, |_| {});
         interact(ui, &shown, view, true);
         statistics
     }
@@ -115,34 +180,27 @@ impl TimePlot<'_> {
         marks: &mut Marks,
     ) -> Moved {
         let color = ui.visuals().strong_text_color();
-        let (shown, _) = self.draw(ui, view.range(), curves, |plot_ui| marks.draw(plot_ui, color));
+        let curves = curves.iter_mut().map(TimeCurve::data);
+        let (drawing, _) = Drawing::of(curves, view.range(), columns(ui), self.min_y_span);
+        let shown = self.draw(ui, view.range(), &drawing, |plot_ui| marks.draw(plot_ui, color));
         let moved = marks.interact(ui, &shown.response, &shown.transform);
         interact(ui, &shown, view, !marks.held());
         moved
     }
 
-    fn draw(
+    pub(super) fn draw(
         &self,
         ui: &mut Ui,
         range: [f64; 2],
-        curves: &mut [TimeCurve<'_>],
+        drawing: &Drawing<'_>,
         beside: impl FnOnce(&mut PlotUi<'_>),
-    ) -> (PlotResponse<()>, Vec<Option<RangeStatistics>>) {
+    ) -> PlotResponse<()> {
         let width = (ui.available_width() - Y_AXIS_WIDTH).max(1.0);
-        let columns = width * ui.ctx().pixels_per_point();
-        let drawn: Vec<(Color32, &Visible)> = curves
-            .iter_mut()
-            .map(|curve| {
-                (curve.color, curve.cache.visible(curve.curve, curve.generation, range, columns as usize))
-            })
-            .collect();
-        let statistics: Vec<_> = drawn.iter().map(|(_, visible)| visible.statistics).collect();
-        let y_range = y_range(&statistics, self.min_y_span);
         let axes = Axes {
             x_label: self.x_label,
             y_label: self.label,
             x_lines: (f64::from(width) / 60.0).clamp(2.0, 8.0),
-            y_lines: (f64::from(self.height) / 40.0).max(4.0),
+            y_lines: self.y_lines(),
         };
         let plot = Plot::new(self.id)
             .height(self.height.max(1.0))
@@ -153,12 +211,17 @@ impl TimePlot<'_> {
             .allow_double_click_reset(false)
             .allow_axis_zoom_drag(false)
             .label_formatter(|_| None);
-        let plot = axes.on(plot, ui.visuals());
-        let shown = plot.show(ui, |plot_ui| {
+        let plot = axes.with(&drawing.extras, plot, ui.visuals());
+        let limit_color = palette(ui.visuals()).error;
+        plot.show(ui, |plot_ui| {
             plot_ui.set_plot_bounds_x(range[0]..=range[1]);
-            plot_ui.set_plot_bounds_y(y_range[0]..=y_range[1]);
-            for (number, (color, visible)) in drawn.iter().enumerate() {
-                for (part, piece) in visible.pieces.iter().enumerate() {
+            plot_ui.set_plot_bounds_y(drawing.y_range[0]..=drawing.y_range[1]);
+            for (number, (name, value)) in drawing.limits.iter().enumerate() {
+                let line = HLine::new(name, *value).id((self.id, "limit", number)).color(limit_color);
+                plot_ui.hline(line.style(LineStyle::dashed_dense()).width(1.0).allow_hover(false));
+            }
+            for (number, (color, pieces)) in drawing.lines.iter().enumerate() {
+                for (part, piece) in pieces.iter().enumerate() {
                     plot_ui.line(
                         Line::new(self.id, PlotPoints::Borrowed(piece))
                             .id((self.id, number, part))
@@ -170,14 +233,26 @@ impl TimePlot<'_> {
                 }
             }
             beside(plot_ui);
-        });
-        (shown, statistics)
+        })
+    }
+
+    /// About how many horizontal grid lines there are.
+    pub(super) fn y_lines(&self) -> f64 {
+        (f64::from(self.height) / 40.0).max(4.0)
     }
 }
 
-/// A vertical range with a margin, never empty, centred on all curves.
-fn y_range(curves: &[Option<RangeStatistics>], min_span: f64) -> [f64; 2] {
-    let ends = curves.iter().flatten().map(|s| [s.min, s.max]);
+/// Pixel columns of a plot that takes the available width.
+pub(super) fn columns(ui: &Ui) -> usize {
+    ((ui.available_width() - Y_AXIS_WIDTH).max(1.0) * ui.ctx().pixels_per_point()) as usize
+}
+
+/// Values beyond this cannot be told apart on a screen, and their differences are no numbers.
+const LARGEST: f64 = 1e300;
+
+/// A vertical range with a margin, never empty, centred on all of these.
+pub(super) fn y_range(ends: impl Iterator<Item = [f64; 2]>, min_span: f64) -> [f64; 2] {
+    let ends = ends.map(|ends| ends.map(|end| end.clamp(-LARGEST, LARGEST)));
     let ends = ends.reduce(|all, one| [all[0].min(one[0]), all[1].max(one[1])]);
     let [low, high] = ends.unwrap_or([0.0, 0.0]);
     let center = 0.5 * low + 0.5 * high;
@@ -185,7 +260,7 @@ fn y_range(curves: &[Option<RangeStatistics>], min_span: f64) -> [f64; 2] {
     [center - half, center + half]
 }
 
-fn interact(ui: &Ui, shown: &PlotResponse<()>, view: &mut TimeView, may_pan: bool) {
+pub(super) fn interact(ui: &Ui, shown: &PlotResponse<()>, view: &mut TimeView, may_pan: bool) {
     let PlotResponse { response, transform, .. } = shown;
     let per_point = view.span / f64::from(transform.frame().width().max(1.0));
     if response.dragged() && may_pan {

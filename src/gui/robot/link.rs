@@ -236,7 +236,7 @@ impl Link {
     pub(crate) fn rows_hz(&self) -> usize {
         let heard = self.status.as_ref().is_some_and(|status| status.connection == Connection::Connected);
         let times = self.history.time_s();
-        let before = times.partition_point(|time_s| *time_s <= self.history.end_s() - 1.0);
+        let before = times.count_up_to(self.history.end_s() - 1.0);
         if heard { times.len() - before } else { 0 }
     }
 }

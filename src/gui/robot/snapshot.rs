@@ -27,6 +27,7 @@ impl RobotTab {
             "rows_hz": link.rows_hz(),
             "end_s": link.history.end_s(),
             "skipped_rows": link.history.skipped(),
+            "dropped_rows": link.history.dropped(),
             "status": status.map(numbers),
             "frames_shown": self.frames.shown(),
             "events": self.events.len(),
