@@ -38,8 +38,8 @@ fn least_squares_with_selection(bencher: Bencher) {
             };
             let rest =
                 (NUISANCES..COLUMNS).filter(|&column| members.iter().all(|member| member.column != column));
-            let best = rest.min_by(|&a, &b| fit(a).total_cmp(&fit(b)));
-            members.extend(best.map(Member::free));
+            let best = rest.map(|column| (fit(column), column)).min_by(|a, b| a.0.total_cmp(&b.0));
+            members.extend(best.map(|(_, column)| Member::free(column)));
         }
         blocks.judge(&members, 1.0)
     });

@@ -1,8 +1,9 @@
 //! Accuracy of the refinement over the cases of the independent generator, as a table.
 //!
 //! `cargo bench -p flqr-core --bench undeclared -- [family…] [--first ROUND] [--rounds N] [--noise FACTOR] [--verbose]`;
-//! families: clean, tolerance, single, quarter, pairs, outside, or the id of an effect. Rounds 0 to 2 are those that the
-//! method was tuned on; figures are told from round 10 on.
+//! families: clean, tolerance, single, quarter, pairs, outside, the same of a motor on a bench behind `bench-` (`bench` for
+//! all of those), or the id of an effect. Rounds 0 to 9 are those that the method was tuned on; figures are told from
+//! round 10 on.
 
 #![expect(clippy::print_stdout, clippy::disallowed_methods, reason = "a table for people, with its time")]
 #[path = "../tests/undeclared/generator/mod.rs"]
@@ -16,10 +17,66 @@ use std::time::Instant;
 use flqr_core::model_file::Model;
 use flqr_core::record::Log;
 use flqr_core::refine::{Options, Refinement, Verdict, refine};
+use generator::bench_cases::{self, BenchCase, Flaw};
+use generator::fault::Fault;
+use generator::robot_run::Recording;
 use generator::{Case, Conditions, cases};
 
 /// Clean robots of a round, and as many within the tolerances.
 const CLEAN: u64 = 8;
+
+/// Length of a log of a motor.
+const BENCH_SECONDS: f64 = 40.0;
+
+/// A case with its truth.
+struct Trial {
+    name: String,
+    /// What it has, for people.
+    faults: String,
+    model: String,
+    ids: Vec<&'static str>,
+    /// Id, key and true value.
+    sizes: Vec<(&'static str, &'static str, f64)>,
+    /// The log, or the held-out one, with a factor on its noise.
+    record: Box<dyn Fn(bool, f64) -> Option<Recording> + Send + Sync>,
+}
+
+impl From<Case> for Trial {
+    fn from(case: Case) -> Self {
+        let weight_n = (case.declared.mass + 2.0 * case.declared.wheel) * case.declared.gravity;
+        let size = |fault: &Fault| {
+            let (key, value) = fault.truth(weight_n)?;
+            Some((fault.id()?, key, value))
+        };
+        Self {
+            name: case.name.clone(),
+            faults: format!("{:?}", case.faults),
+            model: case.declared.model_file(),
+            ids: case.faults.iter().filter_map(|fault| fault.id()).collect(),
+            sizes: case.faults.iter().filter_map(size).collect(),
+            record: Box::new(move |held_out, noise| {
+                case.record(held_out, Conditions { noise, ..Conditions::default() })
+            }),
+        }
+    }
+}
+
+impl From<BenchCase> for Trial {
+    fn from(case: BenchCase) -> Self {
+        let size = |flaw: &Flaw| {
+            let (key, value) = flaw.truth(&case.declared)?;
+            Some((flaw.id()?, key, value))
+        };
+        Self {
+            name: case.name.clone(),
+            faults: format!("{:?}", case.flaws),
+            model: case.model_file(),
+            ids: case.ids(),
+            sizes: case.flaws.iter().filter_map(size).collect(),
+            record: Box::new(move |held_out, noise| Some(case.record(held_out, BENCH_SECONDS, noise))),
+        }
+    }
+}
 
 struct Outcome {
     line: String,
@@ -61,48 +118,61 @@ impl Wanted {
     }
 
     /// Cases of the rounds that are asked for; every round has seeds of its own.
-    fn cases(&self) -> Vec<(&'static str, Case)> {
+    fn cases(&self) -> Vec<(&'static str, Trial)> {
         let mut list = Vec::new();
-        let mut add = |family: &'static str, case: Case| {
-            if self.families.is_empty() || self.families.iter().any(|w| w == family || *w == case.name) {
+        let mut add = |family: &'static str, case: Trial| {
+            let rig = family.split_once('-').map(|(rig, _)| rig);
+            let wanted = |w: &String| w == family || *w == case.name || Some(w.as_str()) == rig;
+            if self.families.is_empty() || self.families.iter().any(wanted) {
                 list.push((family, case));
             }
         };
         for round in self.first..self.first + self.rounds {
             for seed in CLEAN * round..CLEAN * (round + 1) {
-                add("clean", cases::clean(seed, 0.0));
-                add("tolerance", cases::clean(1000 + seed, 0.01));
+                add("clean", cases::clean(seed, 0.0).into());
+                add("tolerance", cases::clean(1000 + seed, 0.01).into());
+                add("bench-clean", BenchCase::clean(seed, 0.0).into());
+                add("bench-tolerance", BenchCase::clean(1000 + seed, 0.01).into());
             }
             for kind in 0..cases::SINGLES {
-                add("single", cases::one(kind, 1.0, 100 + 100 * round + kind as u64));
-                add("quarter", cases::one(kind, 0.25, 2100 + 100 * round + kind as u64));
+                add("single", cases::one(kind, 1.0, 100 + 100 * round + kind as u64).into());
+                add("quarter", cases::one(kind, 0.25, 2100 + 100 * round + kind as u64).into());
             }
             for (pair, seed) in cases::PAIRS.iter().zip(4000 + 100 * round..) {
-                add("pairs", cases::two(*pair, seed));
+                add("pairs", cases::two(*pair, seed).into());
             }
             for (kind, seed) in (0..cases::OUTSIDE).zip(5000 + 100 * round..) {
-                add("outside", cases::unknown(kind, seed));
+                add("outside", cases::unknown(kind, seed).into());
+            }
+            let seeds = 100 * round..;
+            for (kind, seed) in (0..bench_cases::SINGLES).zip(seeds.clone()) {
+                add("bench-single", BenchCase::with(&[kind], 1.0, 2000 + seed).into());
+                add("bench-quarter", BenchCase::with(&[kind], 0.25, 30_000 + seed).into());
+            }
+            for (pair, seed) in bench_cases::PAIRS.iter().zip(seeds.clone()) {
+                add("bench-pairs", BenchCase::with(pair, 1.0, 60_000 + seed).into());
+            }
+            for (kind, seed) in (0..bench_cases::OUTSIDE).zip(seeds) {
+                add("bench-outside", BenchCase::unknown(kind, 90_000 + seed).into());
             }
         }
         list
     }
 }
 
-fn log(case: &Case, held_out: bool, noise: f64) -> Option<Log> {
-    let recording = case.record(held_out, Conditions { noise, ..Conditions::default() })?;
-    Some(Log::from_columns(case.name.clone(), recording))
+fn log(case: &Trial, held_out: bool, noise: f64) -> Option<Log> {
+    Some(Log::from_columns(case.name.clone(), (case.record)(held_out, noise)?))
 }
 
-fn judge(family: &'static str, case: &Case, noise: f64) -> Option<Outcome> {
+fn judge(family: &'static str, case: &Trial, noise: f64) -> Option<Outcome> {
     let (training, held_out) = (log(case, false, noise)?, log(case, true, noise)?);
-    let model =
-        Model::from_toml(&case.declared.model_file(), "declared").expect("the generator writes models");
+    let model = Model::from_toml(&case.model, "declared").expect("the generator writes models");
     let start = Instant::now();
     let found =
         refine(&model, &[training], &[held_out], &Options::default(), &mut |_| ControlFlow::Continue(()))
             .expect("a whole log");
     let seconds = start.elapsed().as_secs_f64();
-    let ids: Vec<&'static str> = case.faults.iter().filter_map(|fault| fault.id()).collect();
+    let ids = &case.ids;
     let is = |found: &flqr_core::refine::Found, id: &str| {
         found.effect.id() == id || found.ambiguous_with.iter().any(|kind| kind.id == id)
     };
@@ -123,14 +193,10 @@ fn judge(family: &'static str, case: &Case, noise: f64) -> Option<Outcome> {
     } else {
         'X'
     };
-    let weight_n = (case.declared.mass + 2.0 * case.declared.wheel) * case.declared.gravity;
-    let sizes = case
-        .faults
-        .iter()
-        .filter_map(|fault| size(&found, fault.id()?, fault.truth(weight_n)?))
-        .collect::<Vec<_>>();
+    let sizes: Vec<(bool, f64)> =
+        case.sizes.iter().filter_map(|&(id, key, truth)| size(&found, id, (key, truth))).collect();
     let line =
-        format!("{mark} {family:9} {:28} {:?}\n      -> {}", case.name, case.faults, told(&found, ratio))
+        format!("{mark} {family:9} {:28} {}\n      -> {}", case.name, case.faults, told(&found, ratio))
             + &format!(" {sizes:.2?}");
     Some(Outcome { line, seconds, named, first_right, all_right, unexplained, ratio, sizes })
 }
@@ -201,12 +267,12 @@ fn main() {
         outcomes.iter().flatten().flat_map(|outcome| outcome.sizes.clone()).collect();
     let inside = sizes.iter().filter(|(inside, _)| *inside).count();
     println!("{inside} of {} intervals hold the true size", sizes.len());
-    println!("family      runs  first right  all right  unexplained  named  error/floor  s");
+    println!("family           runs  first right  all right  unexplained  named  error/floor  s");
     for (family, [runs, first, all, unexplained, named, seconds]) in table {
         let list = ratios.get_mut(family).expect("as many");
         list.sort_by(f64::total_cmp);
         println!(
-            "{family:10} {runs:5} {:11.1}% {:9.1}% {:11.1}% {:5.1}% {:12.2} {:.2}",
+            "{family:15} {runs:5} {:11.1}% {:9.1}% {:11.1}% {:5.1}% {:12.2} {:.2}",
             100.0 * first / runs,
             100.0 * all / runs,
             100.0 * unexplained / runs,

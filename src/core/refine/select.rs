@@ -4,10 +4,12 @@
 //! A block is long against the memory of the residual, so that errors and intervals hold under coloured noise:
 //! nothing here takes rows for independent.
 
+mod products;
+
 use nalgebra::{DMatrix, DVector};
 
-/// Rows of one chunk, whose products stay in the cache.
-const CHUNK: usize = 256;
+use products::{gram_of_blocks, products_with};
+
 /// A pivot of the scaled matrix below this is a column that depends on those before it.
 const DEPENDENT: f64 = 1e-9;
 
@@ -102,30 +104,10 @@ impl Blocks {
     /// Products of `columns` and `target`; `block` numbers the block of each row, from 0.
     pub fn new(columns: &[&[f64]], target: &[f64], block: &[usize]) -> Self {
         let all: Vec<&[f64]> = columns.iter().copied().chain([target]).collect();
-        let count = block.iter().max().map_or(0, |last| last + 1);
-        let mut blocks = vec![DMatrix::zeros(all.len(), all.len()); count];
-        let mut block_rows = vec![0; count];
-        let mut runs: Vec<(usize, std::ops::Range<usize>)> = Vec::new();
-        let mut start = 0;
-        for run in block.chunk_by(|a, b| a == b) {
-            runs.push((run[0], start..start + run.len()));
-            block_rows[run[0]] += run.len();
-            start += run.len();
-        }
-        pulp::Arch::new().dispatch(
-            #[inline(always)]
-            || {
-                for (block, rows) in &runs {
-                    for from in rows.clone().step_by(CHUNK) {
-                        add_products(&mut blocks[*block], &all, from..(from + CHUNK).min(rows.end));
-                    }
-                }
-            },
-        );
+        let (blocks, block_rows) = gram_of_blocks(&all, block);
         let mut total = DMatrix::zeros(all.len(), all.len());
-        for block in &mut blocks {
-            mirror(block);
-            total += &*block;
+        for block in &blocks {
+            total += block;
         }
         Self { blocks, block_rows, total, rows: target.len() }
     }
@@ -183,6 +165,13 @@ impl Blocks {
     /// The fit, judged by leaving out one block after another; nothing where the members depend on each other, in all
     /// rows or without a block.
     pub fn judge(&self, members: &[Member], noise: f64) -> Option<Judged> {
+        let small = self.of_members(members);
+        let own: Vec<Member> =
+            members.iter().enumerate().map(|(column, member)| Member { column, ..*member }).collect();
+        small.judge_all(&own, noise)
+    }
+
+    fn judge_all(&self, members: &[Member], noise: f64) -> Option<Judged> {
         let coefficients = self.fit(members, noise)?;
         let count = self.blocks.len() as f64;
         let mut held_out = Vec::with_capacity(self.blocks.len());
@@ -196,6 +185,39 @@ impl Blocks {
         }
         let left = left(&self.total, members, &coefficients);
         Some(Judged { coefficients, left, held_out, covariance })
+    }
+
+    /// Only what a fit of some members needs of the products.
+    fn of_members(&self, members: &[Member]) -> Self {
+        let columns: Vec<usize> = members.iter().map(|member| member.column).chain([self.target()]).collect();
+        let picked = |gram: &DMatrix<f64>| {
+            DMatrix::from_fn(columns.len(), columns.len(), |i, j| gram[(columns[i], columns[j])])
+        };
+        Self {
+            blocks: self.blocks.iter().map(picked).collect(),
+            block_rows: self.block_rows.clone(),
+            total: picked(&self.total),
+            rows: self.rows,
+        }
+    }
+
+    /// The same columns with another target.
+    pub fn retargeted(&self, columns: &[&[f64]], target: &[f64], block: &[usize]) -> Self {
+        let mut found = self.clone();
+        let last = self.target();
+        found.total.row_mut(last).fill(0.0);
+        found.total.column_mut(last).fill(0.0);
+        let of_blocks = products_with(columns, target, block);
+        for (gram, products) in found.blocks.iter_mut().zip(of_blocks) {
+            for (column, product) in products.into_iter().enumerate() {
+                (gram[(last, column)], gram[(column, last)]) = (product, product);
+                found.total[(last, column)] += product;
+                if column != last {
+                    found.total[(column, last)] += product;
+                }
+            }
+        }
+        found
     }
 
     /// Share of one combination of columns (what an effect does) that other columns can say instead, with the nuisances
@@ -230,39 +252,6 @@ fn normal(gram: &DMatrix<f64>, members: &[Member], noise: f64) -> DMatrix<f64> {
         let known = if i == j { noise / (members[i].spread * members[i].spread) } else { 0.0 };
         gram[(members[i].column, members[j].column)] + known
     })
-}
-
-/// Adds the products of some rows to the lower triangle.
-#[inline(always)]
-fn add_products(gram: &mut DMatrix<f64>, columns: &[&[f64]], rows: std::ops::Range<usize>) {
-    for (j, right) in columns.iter().enumerate() {
-        let right = &right[rows.clone()];
-        for (i, left) in columns.iter().enumerate().skip(j) {
-            gram[(i, j)] += dot(&left[rows.clone()], right);
-        }
-    }
-}
-
-/// Sums side by side, which the compiler turns into vectors.
-#[inline(always)]
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    const LANES: usize = 16;
-    let (mut sums, cut) = ([0.0; LANES], a.len() / LANES * LANES);
-    for (a, b) in a[..cut].chunks_exact(LANES).zip(b[..cut].chunks_exact(LANES)) {
-        for ((sum, a), b) in sums.iter_mut().zip(a).zip(b) {
-            *sum += a * b;
-        }
-    }
-    let rest: f64 = a[cut..].iter().zip(&b[cut..]).map(|(a, b)| a * b).sum();
-    sums.iter().sum::<f64>() + rest
-}
-
-fn mirror(gram: &mut DMatrix<f64>) {
-    for j in 0..gram.ncols() {
-        for i in 0..j {
-            gram[(i, j)] = gram[(j, i)];
-        }
-    }
 }
 
 /// Least squares within bounds: whatever breaks its bound most is held there, and the others are solved for anew.

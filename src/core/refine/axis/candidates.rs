@@ -149,7 +149,7 @@ impl Scales {
             "rad" | "m" if kind.place == Place::Actuator => times(&[0.003, 0.01, 0.03], self.speed),
             "rad" | "m" => times(&[0.001, 0.003, 0.01, 0.03], self.speed),
             "N m" | "N" if kind.id.contains("saturation") => {
-                times(&[0.4, 0.55, 0.7, 0.82, 0.92], self.largest_effort)
+                times(&[0.15, 0.22, 0.3, 0.4, 0.55, 0.7, 0.82, 0.92], self.largest_effort)
             }
             "N m" | "N" => times(&[0.05, 0.12, 0.25, 0.5], self.effort),
             "Hz" => times(&[0.05, 0.1, 0.2, 0.4], self.cutoff_hz),

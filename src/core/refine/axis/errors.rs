@@ -2,29 +2,34 @@
 
 use crate::refine::verdict::{Channels, Errors, Quantity};
 
+use super::floor::Floor;
 use super::rig::Declared;
 use super::trace::{Part, Rows};
 
 /// Errors of what a model leaves of the measured effort, at the held-out rows.
-pub(super) fn errors(declared: &Declared, rows: &Rows, measured: &[f64], left: &[f64]) -> Errors {
+///
+/// `floor` is what noise leaves of it.
+pub(super) fn errors(
+    declared: &Declared,
+    rows: &Rows,
+    measured: &[f64],
+    left: &[f64],
+    floor: &Floor,
+) -> Errors {
     let unit = declared.effort_unit();
-    let rms = |values: &[f64]| {
-        let held_out = rows.rows.iter().zip(values).filter(|(row, _)| row.part == Part::HeldOut);
-        let (sum, count) = held_out.fold((0.0, 0_usize), |(sum, count), (_, v)| (sum + v * v, count + 1));
-        (sum / count.max(1) as f64).sqrt()
-    };
+    let rms = |values: &[f64]| rms(rows, Part::HeldOut, values);
     let channel = |value: f64, unit| Channels(vec![(declared.channel(), Quantity::new(value, unit))]);
     Errors {
         rmse: channel(rms(left), unit),
-        noise_floor: channel(noise_floor(declared, rows), unit),
+        noise_floor: channel(floor.variance.sqrt(), unit),
         nrmse: channel(rms(left) / rms(measured), "1"),
         prediction: Vec::new(),
     }
 }
 
-/// What white noise of position and effort leaves behind the kernel.
-pub(super) fn noise_floor(declared: &Declared, rows: &Rows) -> f64 {
-    let kernel = &rows.kernel;
-    let acceleration = rows.position_noise * kernel.noise_gain(2) * declared.inertia.powi(2);
-    (acceleration + rows.effort_noise * kernel.noise_gain(0)).sqrt()
+/// Root mean square over the rows of a part.
+pub(super) fn rms(rows: &Rows, part: Part, values: &[f64]) -> f64 {
+    let own = rows.rows.iter().zip(values).filter(|(row, _)| row.part == part);
+    let (sum, count) = own.fold((0.0, 0_usize), |(sum, count), (_, v)| (sum + v * v, count + 1));
+    (sum / count.max(1) as f64).sqrt()
 }

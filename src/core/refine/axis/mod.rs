@@ -2,11 +2,14 @@
 
 mod candidates;
 mod errors;
+mod floor;
 mod health;
 mod leftover;
+mod null;
 mod rig;
 mod search;
 mod trace;
+mod tried;
 mod waves;
 
 use std::ops::ControlFlow;
@@ -22,15 +25,21 @@ use super::verdict::{Corrected, Errors, Found, Refinement, Residual, Unexplained
 use super::{Explorer, NextExperiment, Options};
 use candidates::{Scales, library};
 use errors::errors;
+use floor::Floor;
 use leftover::{Dependence, Variable};
 use rig::{Declared, Nuisance};
 use search::{Fit, Search, White};
-use trace::Rows;
+use trace::{Part, Rows};
 
 /// Share of the gain of effects above which what is left shows that they are not the right ones.
 const MISNAMED: f64 = 0.35;
 /// Share of what is left that one variable explains, above which the names are wrong whatever they explain.
 const NEARLY_ALL: f64 = 0.8;
+/// How many times its noise floor an error is at least that something of it is not explained.
+const OVER_FLOOR: f64 = 1.25;
+/// How many times its floor an error may stay, and the share of what was above the floor that effects then have to explain.
+const FAR_OVER_FLOOR: f64 = 2.0;
+const LITTLE: f64 = 0.5;
 /// The same for the speed, where all effects are functions of the speed.
 const STILL_OVER_SPEED: f64 = 0.2;
 const OF_SPEED: [&str; 5] =
@@ -63,7 +72,8 @@ pub(super) fn residual(
         let wanted: Vec<f64> = measured.iter().zip(&target).map(|(measured, left)| measured - left).collect();
         tests.extend(search.leftover(&wanted).unwrap_or_default().iter().map(|found| found.test(&declared)));
     }
-    Ok(Residual { errors: errors(&declared, &rows, &measured, &target), tests, data_health })
+    let floor = Floor::new(&declared, &rows, Part::HeldOut, &target);
+    Ok(Residual { errors: errors(&declared, &rows, &measured, &target, &floor), tests, data_health })
 }
 
 fn report(watch: &mut dyn FnMut(f64) -> ControlFlow<()>, share: f64) -> Result<(), RefineError> {
@@ -81,7 +91,7 @@ pub(super) fn refine(
     let declared = Declared::new(model, options.motor);
     let mut data_health = health::check(logs, &declared);
     let rows = Rows::new(logs, held_out, declared.names());
-    let fitted = rows.rows.iter().filter(|row| row.part == trace::Part::Fit).count();
+    let fitted = rows.rows.iter().filter(|row| row.part == Part::Fit).count();
     data_health.extend(health::check_rows(&rows, &declared, fitted, LEAST_ROWS));
     let [measured, target] = declared.targets(&rows);
     let nuisances = declared.nuisances(&rows, &options.estimate)?;
@@ -106,33 +116,56 @@ pub(super) fn refine(
         return Ok(unfit_refinement(model, data_health));
     };
     let before_left = search.residual(&first.judged.coefficients);
-    let before = errors(&declared, &rows, &measured, &before_left);
     let first_error = first.judged.error() / first.blocks.rows() as f64;
     let before_structure = search.leftover(&wanted).unwrap_or_default();
     report(watch, 0.2)?;
+    let corrected: Vec<(&'static str, f64)> =
+        corrections(&nuisances, &first).iter().map(|c| (c.key, c.value)).collect();
+    let clean = null::Clean {
+        inertia: declared.inertia,
+        curve: declared.corrected_curve(&corrected),
+        effort_noise: Floor::new(&declared, &rows, Part::Fit, &before_left).effort,
+        seed: options.seed,
+    };
+    search.thresholds = null::thresholds(&clean, &rows, &whitener, &search, &library);
+    report(watch, 0.4)?;
     search.run(watch)?;
+    let held_out_error = |left: &[f64]| errors::rms(&rows, Part::HeldOut, left);
+    search.check_held_out(&held_out_error);
     report(watch, 0.8)?;
     let mut structure = search.leftover(&wanted).unwrap_or_default();
     structure.retain(Dependence::shows);
-    let fit = search.fit(&[]).unwrap_or(first);
+    let mut fit = search.fit(&[]).unwrap_or_else(|| first.clone());
+    let mut effects = found_effects(&search, &fit, &declared, &held_out_error);
     let left = search.residual(&fit.judged.coefficients);
-    let after = errors(&declared, &rows, &measured, &left);
-    let effects = found_effects(&search, &fit, &declared, &rows, &measured);
+    let floor = Floor::new(&declared, &rows, Part::HeldOut, &left);
+    let wrong = !effects.is_empty()
+        && (misnamed(first_error, &before_structure, &fit, &structure, &effects)
+            || little([&before_left, &left].map(|left| held_out_error(left)), &floor));
+    if wrong {
+        (effects, fit) = (Vec::new(), first);
+        search.picks.clear();
+    }
+    let left = search.residual(&fit.judged.coefficients);
+    let floor = Floor::new(&declared, &rows, Part::HeldOut, &left);
+    let before = errors(&declared, &rows, &measured, &before_left, &floor);
+    let after = errors(&declared, &rows, &measured, &left, &floor);
+    let over_floor = held_out_error(&left) / floor.variance.sqrt();
+    let over_floor = (floor.measured && over_floor > OVER_FLOOR).then_some(over_floor);
     let corrections = corrections(&nuisances, &fit);
-    let wrong = !effects.is_empty() && misnamed(first_error, &before_structure, &fit, &structure, &effects);
-    let effects = if wrong { Vec::new() } else { effects };
     let structure = if wrong && structure.is_empty() {
         before_structure.into_iter().filter(Dependence::shows).collect()
     } else {
         structure
     };
-    let verdict = match (effects.is_empty(), structure.is_empty() && !wrong) {
+    let verdict = match (effects.is_empty(), structure.is_empty() && over_floor.is_none() && !wrong) {
         (false, _) => Verdict::EffectsFound,
         (true, false) => Verdict::UnexplainedResidual,
         (true, true) => Verdict::ModelAdequate,
     };
     let values: Vec<(&'static str, f64)> = corrections.iter().map(|c| (c.key, c.value)).collect();
-    let explorer = explorer(&declared, &rows, &measured, [&before_left, &left]);
+    let candidates = tried::tried(&search.alone, &effects, search.thresholds, declared.machine.kind);
+    let explorer = explorer(&declared, &rows, &measured, [&before_left, &left], &floor);
     Ok(Refinement {
         verdict,
         model: refined_model(
@@ -143,8 +176,8 @@ pub(super) fn refine(
         effects,
         before,
         after,
-        unexplained: unexplained(&declared, &structure),
-        candidates: Vec::new(),
+        unexplained: unexplained(&declared, &structure, over_floor),
+        candidates,
         closed_loop: None,
         next_experiment: None,
         data_health,
@@ -179,7 +212,13 @@ fn refined_model(mut model: Model, motor: Motor, effects: &[Found]) -> Model {
 }
 
 /// The residual at every row.
-fn explorer(declared: &Declared, rows: &Rows, measured: &[f64], [before, after]: [&Vec<f64>; 2]) -> Explorer {
+fn explorer(
+    declared: &Declared,
+    rows: &Rows,
+    measured: &[f64],
+    [before, after]: [&Vec<f64>; 2],
+    floor: &Floor,
+) -> Explorer {
     let at = |of: fn(&trace::Trace) -> &Vec<f64>| -> Vec<f64> {
         rows.rows.iter().map(|row| of(&rows.traces[row.trace])[row.sample]).collect()
     };
@@ -194,12 +233,12 @@ fn explorer(declared: &Declared, rows: &Rows, measured: &[f64], [before, after]:
             at(|trace| &trace.acceleration),
             at(|trace| &trace.effort),
         ),
-        held_out: rows.rows.iter().map(|row| row.part == trace::Part::HeldOut).collect(),
+        held_out: rows.rows.iter().map(|row| row.part == Part::HeldOut).collect(),
         measured: measured.to_vec(),
         before: before.clone(),
         after: after.clone(),
         unit: declared.effort_unit(),
-        noise_floor: errors::noise_floor(declared, rows),
+        noise_floor: floor.variance.sqrt(),
         orders: Vec::new(),
     }
     .finished(angle.as_deref())
@@ -228,6 +267,14 @@ fn misnamed(
     (best > 0.3 && rest > BETTER * (1.0 - best)) || more * error > MISNAMED * explained
 }
 
+/// Whether effects leave most of what is above the noise floor; errors without and with them.
+fn little([before, after]: [f64; 2], floor: &Floor) -> bool {
+    let explained = before * before - after * after;
+    floor.measured
+        && after > FAR_OVER_FLOOR * floor.variance.sqrt()
+        && explained < LITTLE * (before * before - floor.variance)
+}
+
 fn unfit_refinement(model: &Model, data_health: Vec<HealthFinding>) -> Refinement {
     Refinement {
         verdict: Verdict::DataUnfit,
@@ -246,7 +293,7 @@ fn unfit_refinement(model: &Model, data_health: Vec<HealthFinding>) -> Refinemen
     }
 }
 
-fn unexplained(declared: &Declared, structure: &[Dependence]) -> Unexplained {
+fn unexplained(declared: &Declared, structure: &[Dependence], over_floor: Option<f64>) -> Unexplained {
     let mut depends_on: Vec<String> = Vec::new();
     let mut shares = Vec::new();
     for found in structure {
@@ -256,9 +303,14 @@ fn unexplained(declared: &Declared, structure: &[Dependence]) -> Unexplained {
             shares.push(found.gain);
         }
     }
-    let description = match depends_on.first() {
-        Some(first) => format!("{first} still explains {:.1} % of the residual", 100.0 * shares[0]),
-        None => String::new(),
+    let description = match (depends_on.first(), over_floor) {
+        (Some(first), _) => format!("{first} still explains {:.1} % of the residual", 100.0 * shares[0]),
+        (None, Some(ratio)) => {
+            format!(
+                "the error is {ratio:.2} times its noise floor, and nothing that was recorded explains it"
+            )
+        }
+        (None, None) => String::new(),
     };
     Unexplained { depends_on, shares, description }
 }
@@ -283,8 +335,7 @@ fn found_effects(
     search: &Search<'_>,
     fit: &Fit,
     declared: &Declared,
-    rows: &Rows,
-    measured: &[f64],
+    error: &dyn Fn(&[f64]) -> f64,
 ) -> Vec<Found> {
     let t = student_t_975(fit.blocks.count().max(2) - 1);
     let mut first = search.nuisances.len();
@@ -294,7 +345,6 @@ fn found_effects(
         first += pick.columns.len();
     }
     let all = search.residual(&fit.judged.coefficients);
-    let error = |left: &[f64]| errors(declared, rows, measured, left).rmse.main();
     let mut found: Vec<Found> = Vec::new();
     for (index, pick) in search.picks.iter().enumerate() {
         if found.iter().any(|found| found.effect.kind() == pick.kind) {
@@ -339,7 +389,7 @@ fn found_effects(
         let units = (0..effect.parameters().len())
             .map(|n| parameters[n % parameters.len()].unit(declared.machine.kind))
             .collect();
-        let drop = 1.0 - error(&all) / search.error_without(&members, &error).unwrap_or(f64::NAN);
+        let drop = 1.0 - error(&all) / search.error_without(&members, error).unwrap_or(f64::NAN);
         let mut ambiguous_with = Vec::new();
         for &member in &members {
             for kind in search.ambiguous_with(member, fit) {

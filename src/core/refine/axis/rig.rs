@@ -291,6 +291,27 @@ impl Declared {
         Ok(found)
     }
 
+    /// The friction curve with corrected numbers; none where no curve has them.
+    pub(super) fn corrected_curve(&self, corrections: &[(&'static str, f64)]) -> Option<Stribeck> {
+        let value = |key: &str, declared: f64| {
+            corrections.iter().find(|(name, _)| *name == key).map_or(declared, |&(_, value)| value)
+        };
+        let keys = self.axis().keys();
+        let p = self.curve();
+        Stribeck::new(StribeckParameters {
+            coulomb_nm: value(keys[place::COULOMB], p.coulomb_nm).max(0.0),
+            static_nm: match p.static_nm == p.coulomb_nm {
+                true => value(keys[place::COULOMB], p.coulomb_nm).max(0.0),
+                false => value(keys[place::STATIC], p.static_nm).max(0.0),
+            },
+            viscous_nm_s_rad: value(keys[place::VISCOUS], p.viscous_nm_s_rad).max(0.0),
+            stribeck_speed_rad_s: value(keys[place::STRIBECK_SPEED], p.stribeck_speed_rad_s),
+            stribeck_exponent: value(keys[place::STRIBECK_EXPONENT], p.stribeck_exponent).min(10.0),
+            offset_nm: value(keys[place::OFFSET], p.offset_nm),
+        })
+        .ok()
+    }
+
     /// The model with corrected numbers.
     pub(super) fn corrected_model(
         &self,
@@ -302,19 +323,7 @@ impl Declared {
             corrections.iter().find(|(name, _)| *name == key).map_or(declared, |&(_, value)| value)
         };
         let keys = self.axis().keys();
-        let p = self.curve();
-        let curve = Stribeck::new(StribeckParameters {
-            coulomb_nm: value(keys[place::COULOMB], p.coulomb_nm).max(0.0),
-            static_nm: match p.static_nm == p.coulomb_nm {
-                true => value(keys[place::COULOMB], p.coulomb_nm).max(0.0),
-                false => value(keys[place::STATIC], p.static_nm).max(0.0),
-            },
-            viscous_nm_s_rad: value(keys[place::VISCOUS], p.viscous_nm_s_rad).max(0.0),
-            stribeck_speed_rad_s: value(keys[place::STRIBECK_SPEED], p.stribeck_speed_rad_s),
-            stribeck_exponent: value(keys[place::STRIBECK_EXPONENT], p.stribeck_exponent).min(10.0),
-            offset_nm: value(keys[place::OFFSET], p.offset_nm),
-        })
-        .ok();
+        let curve = self.corrected_curve(corrections);
         let has_friction = self.friction.is_some()
             || corrections.iter().any(|(key, _)| keys[place::VISCOUS..=place::OFFSET].contains(key));
         let friction = if has_friction { curve } else { None };

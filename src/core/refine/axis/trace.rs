@@ -365,7 +365,7 @@ fn choose_kernel<'a>(
     best.map_or_else(|| Kernel::new(highest, step_s), |(_, kernel)| kernel)
 }
 
-fn second_difference(position: &[f64], step_s: f64) -> Vec<f64> {
+pub(super) fn second_difference(position: &[f64], step_s: f64) -> Vec<f64> {
     let last = position.len() - 1;
     let at = |sample: usize| {
         let middle = sample.clamp(1, last.max(2) - 1);

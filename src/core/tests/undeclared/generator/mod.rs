@@ -2,11 +2,13 @@
 //!
 //! Nothing here is shared with the engine: other integrator, other sticking, other sensors and controller.
 
+pub(crate) mod bench_cases;
+mod bench_run;
 mod body;
 pub(crate) mod cases;
 pub(crate) mod fault;
 mod random;
-mod robot_run;
+pub(crate) mod robot_run;
 
 use body::Body;
 pub(crate) use cases::Case;

@@ -1,0 +1,115 @@
+//! What a finished search says beside its picks: look-alikes, errors without a pick, and what is left.
+
+use crate::effects::EffectKind;
+use crate::refine::select::{Blocks, Member};
+
+use super::super::candidates::Candidate;
+use super::super::leftover;
+use super::{Fit, Search};
+
+/// Squared cosine above which two effects are not told apart.
+const INSEPARABLE: f64 = 0.81;
+/// Share of its gain that the other has in its place.
+const DOES_AS_WELL: f64 = 0.7;
+
+impl Search<'_> {
+    /// Kinds that say the same as a pick on this log.
+    pub(in super::super) fn ambiguous_with(&self, pick: usize, fit: &Fit) -> Vec<&'static EffectKind> {
+        let others: Vec<Candidate> =
+            self.library.iter().filter(|other| other.kind != self.picks[pick].kind).cloned().collect();
+        let blocks = self.gram(&others, &[]);
+        let places = self.places(&others);
+        let (picks, others) = places.split_at(self.picks.len());
+        let (chosen, first) = picks[pick];
+        let signal: Vec<(usize, f64)> =
+            (0..chosen.columns.len()).map(|i| (first + i, fit.judged.coefficients[first + i])).collect();
+        let rest: Vec<_> = (0..picks.len()).filter(|&i| i != pick).map(|i| picks[i]).collect();
+        let mut found: Vec<&'static EffectKind> = Vec::new();
+        for &(other, place) in others {
+            let with = [rest.as_slice(), &[(chosen, first), (other, place)]].concat();
+            let nuisances: Vec<Member> = self
+                .members(&with, false)
+                .into_iter()
+                .filter(|member| {
+                    let of_pick = (first..first + chosen.columns.len()).contains(&member.column);
+                    let of_other = (place..place + other.columns.len()).contains(&member.column);
+                    !of_pick && !of_other
+                })
+                .collect();
+            let columns: Vec<usize> = (place..place + other.columns.len()).collect();
+            let overlap = blocks.overlap(&nuisances, fit.noise, &signal, &columns);
+            let in_its_place = || {
+                let with: Vec<_> = rest.iter().copied().chain([(other, place)]).collect();
+                let error = |chosen: &[(&Candidate, usize)]| {
+                    let members = self.members(chosen, true);
+                    Some(self.judge(&blocks, chosen, &members, fit.noise)?.error())
+                };
+                let [without, with, own] = [error(&rest)?, error(&with)?, error(picks)?];
+                Some((without - with) / (without - own))
+            };
+            if overlap > INSEPARABLE
+                && !found.contains(&other.kind)
+                && in_its_place().is_some_and(|share| share > DOES_AS_WELL)
+            {
+                found.push(other.kind);
+            }
+        }
+        found
+    }
+
+    /// Error on the held-out rows of a fit without some picks.
+    pub(in super::super) fn error_without(
+        &self,
+        out: &[usize],
+        error: &dyn Fn(&[f64]) -> f64,
+    ) -> Option<f64> {
+        let kept =
+            (0..self.picks.len()).filter(|i| !out.contains(i)).map(|i| self.picks[i].clone()).collect();
+        let trial = self.with_picks(kept);
+        let fit = trial.fit(&[])?;
+        Some(error(&trial.residual(&fit.judged.coefficients)))
+    }
+
+    /// What the residual still depends on.
+    pub(in super::super) fn leftover(&self, wanted: &[f64]) -> Option<Vec<leftover::Dependence>> {
+        let fit = self.fit(&[])?;
+        let mut found = Vec::new();
+        let residual = self.whitener.apply(&self.residual(&fit.judged.coefficients));
+        for (variable, columns) in leftover::groups(self.rows, wanted, self.whitener, &residual) {
+            let white: Vec<Vec<f64>> = columns.iter().map(|column| self.whitener.apply(column)).collect();
+            let blocks = self.gram(&[], &white);
+            let last = blocks.target() - 1;
+            let kept: Vec<usize> = independent(&blocks, &fit.members, last - white.len()..last, fit.noise);
+            let mut members = fit.members.clone();
+            let spread =
+                |column: usize| 3.0 * (fit.noise * blocks.rows() as f64).sqrt() / blocks.length(column);
+            members
+                .extend(kept.iter().map(|&column| Member { spread: spread(column), ..Member::free(column) }));
+            if let Some(judged) = self.judge(&blocks, &self.places(&[]), &members, fit.noise) {
+                let gain = judged.gain_over(&fit.judged);
+                found.push(leftover::Dependence { variable, gain, z: judged.gain_z(&fit.judged) });
+            }
+        }
+        found.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        Some(found)
+    }
+}
+
+/// Columns that are not said by the members and the columns before them.
+fn independent(
+    blocks: &Blocks,
+    members: &[Member],
+    columns: std::ops::Range<usize>,
+    noise: f64,
+) -> Vec<usize> {
+    let mut kept = Vec::new();
+    for column in columns {
+        let before: Vec<Member> =
+            members.iter().copied().chain(kept.iter().map(|&column| Member::free(column))).collect();
+        let power = blocks.power_beyond(&before, noise, &[(column, 1.0)]).unwrap_or(0.0);
+        if power > 1e-3 * blocks.length(column).powi(2) {
+            kept.push(column);
+        }
+    }
+    kept
+}
