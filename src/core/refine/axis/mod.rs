@@ -38,7 +38,7 @@ const NEARLY_ALL: f64 = 0.8;
 /// How many times its noise floor an error is at least that something of it is not explained.
 const OVER_FLOOR: f64 = 1.25;
 /// How many times its floor an error may stay, and the share of what was above the floor that effects then have to explain.
-const FAR_OVER_FLOOR: f64 = 2.0;
+const FAR_OVER_FLOOR: f64 = 1.4;
 const LITTLE: f64 = 0.5;
 /// The same for the speed, where all effects are functions of the speed.
 const STILL_OVER_SPEED: f64 = 0.2;
@@ -46,6 +46,10 @@ const OF_SPEED: [&str; 5] =
     ["quadratic_drag", "viscous_asymmetry", "viscous_error", "coulomb_error", "low_speed_friction"];
 /// How many times less a function of one variable leaves than effects that are not the right ones.
 const BETTER: f64 = 2.5;
+/// What the method itself is off by as a share of a value, as made logs show it; with noise of the effort in the columns
+/// more. It counts in intervals.
+const OFF: f64 = 0.01;
+const OFF_WITH_EFFORT: f64 = 0.03;
 /// Fewest rows that are fitted.
 const LEAST_ROWS: usize = 200;
 
@@ -88,9 +92,10 @@ pub(super) fn refine(
     options: &Options,
     watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<Refinement, RefineError> {
-    let declared = Declared::new(model, options.motor);
+    let mut declared = Declared::new(model, options.motor);
     let mut data_health = health::check(logs, &declared);
     let rows = Rows::new(logs, held_out, declared.names());
+    declared.take_over_free(&rows, &options.estimate);
     let fitted = rows.rows.iter().filter(|row| row.part == Part::Fit).count();
     data_health.extend(health::check_rows(&rows, &declared, fitted, LEAST_ROWS));
     let [measured, target] = declared.targets(&rows);
@@ -120,7 +125,7 @@ pub(super) fn refine(
     let before_structure = search.leftover(&wanted).unwrap_or_default();
     report(watch, 0.2)?;
     let corrected: Vec<(&'static str, f64)> =
-        corrections(&nuisances, &first).iter().map(|c| (c.key, c.value)).collect();
+        corrections(&declared, &nuisances, &first).iter().map(|c| (c.key, c.value)).collect();
     let clean = null::Clean {
         inertia: declared.inertia,
         curve: declared.corrected_curve(&corrected),
@@ -152,7 +157,7 @@ pub(super) fn refine(
     let after = errors(&declared, &rows, &measured, &left, &floor);
     let over_floor = held_out_error(&left) / floor.variance.sqrt();
     let over_floor = (floor.measured && over_floor > OVER_FLOOR).then_some(over_floor);
-    let corrections = corrections(&nuisances, &fit);
+    let corrections = corrections(&declared, &nuisances, &fit);
     let structure = if wrong && structure.is_empty() {
         before_structure.into_iter().filter(Dependence::shows).collect()
     } else {
@@ -315,14 +320,14 @@ fn unexplained(declared: &Declared, structure: &[Dependence], over_floor: Option
     Unexplained { depends_on, shares, description }
 }
 
-fn corrections(nuisances: &[Nuisance], fit: &Fit) -> Vec<Corrected> {
+fn corrections(declared: &Declared, nuisances: &[Nuisance], fit: &Fit) -> Vec<Corrected> {
     let t = student_t_975(fit.blocks.count().max(2) - 1);
     let corrected = |(index, nuisance): (usize, &Nuisance)| {
         let change = fit.judged.coefficients[index];
         let width = t * fit.judged.standard_error(index);
         Corrected {
             key: nuisance.key,
-            declared: nuisance.declared,
+            declared: declared.in_file(nuisance),
             value: nuisance.corrected(change),
             ci95: Some([nuisance.corrected(change - width), nuisance.corrected(change + width)]),
         }
@@ -383,7 +388,9 @@ fn found_effects(
                     Role::Shape => shape_widths.next().flatten(),
                     Role::Amplitude => widths.next(),
                 };
-                width.filter(|_| !whole).map(|width| [value - t * width, value + t * width])
+                let off = if pick.uses_effort() { OFF_WITH_EFFORT } else { OFF } * value;
+                let width = width.filter(|_| !whole).map(|width| (t * width).hypot(off));
+                width.map(|width| [value - width, value + width])
             })
             .collect();
         let units = (0..effect.parameters().len())

@@ -77,9 +77,7 @@ pub(super) fn thresholds(
         let target: Vec<f64> = rows.rows.iter().map(|row| measured[row.trace][row.sample]).collect();
         search.best_of_noise(&gram, candidates, &whitener.apply(&target))
     });
-    let found: Vec<[f64; 2]> = found.into_iter().flatten().collect();
-    Thresholds::default()
-        .raised(tail(found.iter().map(|best| best[0])), tail(found.iter().map(|best| best[1])))
+    Thresholds::default().raised(tail(found.into_iter().flatten()))
 }
 
 /// What the declared chain leaves of a clean motor's effort.

@@ -8,13 +8,17 @@ use crate::refine::Variable;
 use crate::refine::error::RefineError;
 use crate::robot::Motor;
 
-use super::trace::{Names, Rows, Trace};
-use crate::refine::select::Member;
+use super::trace::{Names, Part, Rows, Trace};
+use crate::refine::select::{Blocks, Member};
 
 /// Share of the Coulomb level that an offset may be off by, beside its own tolerance.
 const OFFSET_OF_COULOMB: f64 = 0.01;
+/// A curve that fades above this share of the fastest motion is as good as constant there.
+const STRIBECK_OF_FASTEST: f64 = 0.5;
 /// How far a free inertia may be from the declared one, as a share of it.
 const FREE_INERTIA: [f64; 2] = [-0.99, 99.0];
+/// Largest share of the acceleration's power that is taken for noise.
+const MOST_NOISE: f64 = 0.5;
 /// A sampled torque may act anywhere between its own row and the next.
 const TIMING_ROWS: f64 = 0.5;
 
@@ -23,6 +27,8 @@ const TIMING_ROWS: f64 = 0.5;
 pub(super) struct Declared {
     pub(super) machine: Machine,
     pub(super) inertia: f64,
+    /// As in the model file.
+    declared_inertia: f64,
     pub(super) gravity: f64,
     pub(super) friction: Option<StribeckParameters>,
     pub(super) effects: Vec<Effect>,
@@ -92,6 +98,7 @@ impl Declared {
         Self {
             machine,
             inertia,
+            declared_inertia: inertia,
             gravity,
             friction: friction.map(|curve| *curve.parameters()),
             effects,
@@ -179,6 +186,36 @@ impl Declared {
             target.iter_mut().zip(&known).for_each(|(target, known)| *target -= known);
         }
         [measured, target]
+    }
+
+    /// Puts a free inertia where the rows have it, as a first guess: the noise of an acceleration is weighed by it.
+    pub(super) fn take_over_free(&mut self, rows: &Rows, estimate: &[String]) {
+        let key = self.axis().keys()[place::INERTIA];
+        if !estimate.iter().any(|name| name == "all" || name == key) {
+            return;
+        }
+        let measured = rows.column(torque_between);
+        let columns = [
+            rows.column(Trace::second_difference),
+            rows.column(|trace| trace.speed.clone()),
+            rows.column(|trace| trace.speed.iter().map(|&speed| direction(speed)).collect()),
+            rows.column(|trace| vec![1.0; trace.position.len()]),
+        ];
+        let fitted: Vec<usize> =
+            (0..rows.rows.len()).filter(|&row| rows.rows[row].part == Part::Fit).collect();
+        let at = |column: &[f64]| -> Vec<f64> { fitted.iter().map(|&row| column[row]).collect() };
+        let columns = columns.map(|column| at(&column));
+        let views: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+        let mut blocks = Blocks::new(&views, &at(&measured), &vec![0; fitted.len()]);
+        let noise = rows.position_noise * rows.kernel.noise_gain(2);
+        let power = blocks.length(0).powi(2) / fitted.len().max(1) as f64;
+        blocks.discount(0, 0, noise.min(MOST_NOISE * power));
+        // One way, the direction is the offset.
+        let all = [0, 1, 2, 3].map(Member::free);
+        let found = blocks.fit(&all, 0.0).or_else(|| blocks.fit(&[all[0], all[1], all[3]], 0.0));
+        if let Some(inertia) = found.map(|found| found[0]).filter(|inertia| *inertia > 0.0) {
+            self.inertia = inertia;
+        }
     }
 
     /// Everything that is estimated along.
@@ -280,6 +317,24 @@ impl Declared {
         if !self.is_linear() {
             add(place::GRAVITY, self.gravity, gravity, "", rows.column(sines));
         }
+        // A curve without a Stribeck part may lack a little of one, at speeds that the log has.
+        let level = share(place::STATIC) * curve.coulomb_nm;
+        let fastest = rows.pick(|trace, sample| trace.speed[sample].abs()).into_iter().fold(0.0, f64::max);
+        let scale = curve.stribeck_speed_rad_s;
+        if !stribeck && level > 0.0 && scale < STRIBECK_OF_FASTEST * fastest {
+            let faded = |trace: &Trace| {
+                let at = |&v: &f64| direction(v) * fading(v, scale, curve.stribeck_exponent);
+                trace.speed.iter().map(at).collect()
+            };
+            found.push(Nuisance {
+                key: "",
+                declared: 0.0,
+                column: rows.column(faded),
+                tolerance: level,
+                free: false,
+                effect: "",
+            });
+        }
         found.push(Nuisance {
             key: "",
             declared: 0.0,
@@ -289,6 +344,11 @@ impl Declared {
             effect: "",
         });
         Ok(found)
+    }
+
+    /// A number as the model file has it.
+    pub(super) fn in_file(&self, nuisance: &Nuisance) -> f64 {
+        if nuisance.effect == "inertia_error" { self.declared_inertia } else { nuisance.declared }
     }
 
     /// The friction curve with corrected numbers; none where no curve has them.

@@ -16,6 +16,8 @@ const NOISE_SHARE: f64 = 0.05;
 const ROWS_A_PERIOD: f64 = 2.5;
 /// A speed below this share of the root mean square may be a rest.
 const REST_SHARE: f64 = 0.03;
+/// Share of rows in one direction below which motion goes the other way alone.
+const ONE_WAY: f64 = 0.05;
 /// Between the part that is fitted and the part that is held out, s.
 const HELD_OUT_GAP_S: f64 = 0.5;
 /// Periods of the cut-off that are left out at the ends of a stretch.
@@ -246,6 +248,13 @@ impl Rows {
         let rms = (speed.iter().map(|v| v * v).sum::<f64>() / speed.len().max(1) as f64).sqrt();
         let noise = (self.position_noise * self.kernel.noise_gain(1)).sqrt();
         rms > 5.0 * noise
+    }
+
+    /// Whether a fair share of the rows goes either way.
+    pub(super) fn both_ways(&self) -> bool {
+        let forward = self.rows.iter().filter(|row| self.traces[row.trace].speed[row.sample] > 0.0).count();
+        let share = forward as f64 / self.rows.len().max(1) as f64;
+        (ONE_WAY..=1.0 - ONE_WAY).contains(&share)
     }
 
     /// A signal of each trace at the rows, unfiltered.

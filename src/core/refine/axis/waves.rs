@@ -33,7 +33,7 @@ pub(super) fn strongest(
         .map(|kind| {
             let weight = |&row: &usize| match kind.id {
                 "torque_ripple" => effort[row],
-                "position_dependent_friction" => direction(speed[row]),
+                _ if against_motion(kind) => direction(speed[row]),
                 _ => 1.0,
             };
             chosen.iter().map(weight).collect()
@@ -74,6 +74,11 @@ pub(super) fn strongest(
         found.extend(new.take(CLOSELY).map(|shape| (kind, shape)));
     }
     found
+}
+
+/// Whether a kind of harmonics acts against the motion.
+pub(super) fn against_motion(kind: &EffectKind) -> bool {
+    kind.id == "position_dependent_friction"
 }
 
 /// The kernel's gain over angular frequency, and the power that kernel and whitening leave.

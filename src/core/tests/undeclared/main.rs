@@ -5,6 +5,7 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 #![expect(clippy::disallowed_methods, reason = "these tests read the given logs")]
 
+mod bench;
 mod generator;
 
 use std::num::NonZeroUsize;

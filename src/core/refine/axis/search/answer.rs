@@ -1,6 +1,6 @@
 //! What a finished search says beside its picks: look-alikes, errors without a pick, and what is left.
 
-use crate::effects::EffectKind;
+use crate::effects::{EffectKind, KINDS};
 use crate::refine::select::{Blocks, Member};
 
 use super::super::candidates::Candidate;
@@ -15,8 +15,14 @@ const DOES_AS_WELL: f64 = 0.7;
 impl Search<'_> {
     /// Kinds that say the same as a pick on this log.
     pub(in super::super) fn ambiguous_with(&self, pick: usize, fit: &Fit) -> Vec<&'static EffectKind> {
-        let others: Vec<Candidate> =
-            self.library.iter().filter(|other| other.kind != self.picks[pick].kind).cloned().collect();
+        let own = &self.picks[pick];
+        let mut others: Vec<Candidate> =
+            self.library.iter().filter(|other| other.kind != own.kind).cloned().collect();
+        if own.kind.series {
+            let alike = KINDS.into_iter().filter(|kind| kind.series && *kind != own.kind);
+            let on = alike.filter(|kind| kind.is_on(self.machine.kind));
+            others.extend(on.map(|kind| self.candidate(kind, own.shape.clone())));
+        }
         let blocks = self.gram(&others, &[]);
         let places = self.places(&others);
         let (picks, others) = places.split_at(self.picks.len());

@@ -52,9 +52,9 @@ impl Default for Thresholds {
 }
 
 impl Thresholds {
-    /// As high as both.
-    pub(in super::super) fn raised(self, gain: f64, z: f64) -> Self {
-        Self { gain: self.gain.max(gain), z: self.z.max(z) }
+    /// With a gain of at least `gain`.
+    pub(in super::super) fn raised(self, gain: f64) -> Self {
+        Self { gain: self.gain.max(gain), ..self }
     }
 }
 
@@ -108,7 +108,10 @@ impl Search<'_> {
         let residual = self.whitener.apply(&self.residual(&now.judged.coefficients));
         let waves =
             waves::strongest(self.machine, self.rows, &self.scales, self.whitener, &residual, &self.picks);
-        Some(waves.into_iter().map(|(kind, shape)| self.candidate(kind, shape)).collect())
+        // One way, friction that depends on the angle and a torque that does so are the same.
+        let waves =
+            waves.into_iter().filter(|(kind, _)| self.rows.both_ways() || !waves::against_motion(kind));
+        Some(waves.map(|(kind, shape)| self.candidate(kind, shape)).collect())
     }
 
     /// One more effect, or pair; false where none passes.
@@ -251,13 +254,14 @@ impl Search<'_> {
         found
     }
 
-    /// Gain and z of the best of some candidates alone, with a white target in the place of the measured one.
+    /// Gain of the best of some candidates that are sure of their size alone, with a white target in the place of the
+    /// measured one.
     pub(in super::super) fn best_of_noise(
         &self,
         gram: &Blocks,
         candidates: &[Candidate],
         target: &[f64],
-    ) -> Option<[f64; 2]> {
+    ) -> Option<f64> {
         let mut blocks = gram.retargeted(&self.white_columns(candidates, &[]), target, &self.white.blocks);
         self.discount_noise(&mut blocks, candidates);
         let places = self.places(candidates);
@@ -265,18 +269,18 @@ impl Search<'_> {
         let noise = self.noise(&blocks, &members)?;
         let base = self.judge(&blocks, &[], &members, noise)?;
         let round = Round { blocks: &blocks, picks: &[], more: &places, noise };
-        let mut best = [0.0_f64; 2];
-        for index in 0..places.len() {
-            let Some(tried) = self.try_with(&round, &[index]).filter(|tried| !tried.at_bound) else {
-                continue;
-            };
-            let gain = tried.judged.gain_over(&base);
-            // What helps not at all is not named however sure its size is.
-            if gain > 0.0 {
-                best = [best[0].max(gain), best[1].max(tried.z)];
+        let sure = |index: usize| {
+            // What gains too little on all rows gains less on left-out ones.
+            let chosen = [places[index]];
+            let members = self.members(&chosen, true);
+            let left = blocks.left(&members, &blocks.fit(&members, noise)?);
+            if left > (1.0 - LEAST_GAIN) * base.left {
+                return None;
             }
-        }
-        Some(best)
+            self.try_with(&round, &[index]).filter(|tried| !tried.at_bound && tried.z >= LEAST_Z)
+        };
+        let gains = (0..places.len()).filter_map(sure).map(|tried| tried.judged.gain_over(&base));
+        Some(gains.fold(0.0, f64::max))
     }
 
     fn has(&self, candidate: &Candidate) -> bool {

@@ -177,7 +177,7 @@ fn single(kind: usize, shaft: &Shaft, random: &mut Random) -> Vec<Flaw> {
         14 => Lag { seconds: size(0.005, 0.012) },
         15 => Gain { share: random.sign() * random.between(0.25, 0.4) },
         16 => Inertia { share: size(0.3, 0.6) },
-        17 => Saturation { nm: level * size(1.4, 1.9) },
+        17 => Saturation { nm: level * size(1.6, 2.2) },
         18 => Deadzone { nm: size(0.01, 0.025) },
         _ => {
             // Two or three orders.

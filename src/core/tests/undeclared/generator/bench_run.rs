@@ -247,7 +247,7 @@ fn reference(style: u64, ticks: usize, random: &mut Random) -> Vec<[f64; 2]> {
         .collect()
 }
 
-/// A log of `seconds` at 1 kHz.
+/// A log of `seconds` at 1 kHz, with a factor on all noise.
 pub(crate) fn run(case: &BenchCase, seconds: f64, noise: f64, seed: u64) -> Recording {
     let mut random = Random::new(seed.wrapping_mul(104_729).wrapping_add(5));
     let ticks = (seconds / TICK) as usize;
@@ -270,8 +270,8 @@ pub(crate) fn run(case: &BenchCase, seconds: f64, noise: f64, seed: u64) -> Reco
         let seen_speed =
             ((plant.speed + noise * SPEED_NOISE * random.normal()) / SPEED_STEP).round() * SPEED_STEP;
         let lack = speed - seen_speed;
-        integral = (integral + TICK * 0.25 * lack).clamp(-0.2, 0.2);
-        let asked = (0.05 * lack + integral + shake).clamp(-0.6, 0.6);
+        integral = (integral + TICK * 0.25 * lack).clamp(-0.08, 0.08);
+        let asked = (0.05 * lack + integral + shake).clamp(-0.25, 0.25);
         let drive = Drive {
             acting: plant.acting(asked, &mut random),
             disturbance: noise * UNMEASURED * random.normal(),
