@@ -442,6 +442,10 @@ impl App {
             self.recent.note_log(&log);
             self.save_recent();
         }
+        if let Some(scenario) = done.scenario {
+            self.experiments.choose(scenario);
+            self.commands.send(Command::SelectTab(Tab::Experiments));
+        }
         if self.session != before {
             self.tune.refresh(&self.session);
             self.designer.update(&self.session);

@@ -21,7 +21,7 @@ use egui::{
     CentralPanel, Color32, Context, Frame, Margin, Panel, Rect, RichText, ScrollArea, Ui, Vec2, vec2,
 };
 use flqr_core::model_file::{Model, RobotModel};
-use flqr_core::simulate::Summary;
+use flqr_core::simulate::{Scenario, Summary};
 
 use crate::command::{Commands, FilePurpose};
 use crate::context::ViewContext;
@@ -104,6 +104,12 @@ impl ExperimentsTab {
         let visible_s = self.plots.stack.view.range();
         let extent = Extent { range_s: self.table.range(comparison, visible_s), visible_s };
         self.saver.start(comparison, extent, (saved_as, path, replace), self.page, ctx, waker)
+    }
+
+    /// Another scenario for the next runs.
+    pub(crate) fn choose(&mut self, scenario: Scenario) {
+        self.settings.choose(scenario);
+        self.limited = Limited::default();
     }
 
     /// Name that a dialog offers.

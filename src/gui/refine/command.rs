@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use flqr_core::simulate::Scenario;
+
 use super::run::Question;
 use super::save::SavedAs;
 
@@ -22,6 +24,8 @@ pub(crate) enum RefineCommand {
     Cancel,
     /// Puts what was found into the session's model.
     Use,
+    /// Goes to the experiments with the scenario of the next experiment.
+    Simulate(Scenario),
     /// Saves the report or the refined model; an existing file is replaced only if `replace`.
     Save {
         saved_as: SavedAs,

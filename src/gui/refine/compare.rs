@@ -1,7 +1,7 @@
 //! Errors before and after, on rows that took no part in the estimates.
 
 use egui::{Grid, RichText, Ui};
-use flqr_core::refine::{Channels, Errors, Refinement, Residual};
+use flqr_core::refine::{Channels, ClosedLoop, Errors, LoopRun, Quantity, Refinement, Residual};
 
 use super::strip::{StepState, Tone};
 use crate::widgets::{hint_ui, mono, section_ui, shown};
@@ -39,7 +39,7 @@ pub(super) fn state(found: Option<&Refinement>) -> StepState {
 /// Rows of one or two sets of errors.
 fn rows(first: &Errors, second: Option<&Errors>) -> Vec<Row> {
     let channels = |what: &str, of: fn(&Errors) -> &Channels| -> Vec<Row> {
-        let row = |(index, (channel, quantity)): (usize, &(&'static str, flqr_core::refine::Quantity))| {
+        let row = |(index, (channel, quantity)): (usize, &(&'static str, Quantity))| {
             let after = second.and_then(|second| of(second).0.get(index)).map(|(_, q)| q.value);
             Row {
                 name: format!("{what}, {channel}"),
@@ -55,7 +55,7 @@ fn rows(first: &Errors, second: Option<&Errors>) -> Vec<Row> {
     for (index, prediction) in first.prediction.iter().enumerate() {
         let after = second.and_then(|second| second.prediction.get(index)).map(|p| p.rmse.value);
         rows.push(Row {
-            name: format!("prediction over {} ms", shown(1e3 * prediction.horizon_s, 3)),
+            name: format!("{} after {} ms", prediction.variable, shown(1e3 * prediction.horizon_s, 3)),
             values: [Some(prediction.rmse.value), after],
             unit: prediction.rmse.unit,
         });
@@ -71,9 +71,44 @@ pub(super) fn ui(found: &Refinement, ui: &mut Ui) {
         ui,
         "The same rows and filters before and after; before: the declared model, its numbers estimated within their tolerances.",
     );
+    if let Some(closed_loop) = &found.closed_loop {
+        closed_loop_ui(closed_loop, ui);
+    }
     if !found.parameters.is_empty() {
         section_ui(ui, "Declared numbers as the logs have them", |_| {});
         parameters_ui(found, ui);
+    }
+}
+
+/// The refined model as the plant, under both controllers.
+fn closed_loop_ui(closed_loop: &ClosedLoop, ui: &mut Ui) {
+    section_ui(ui, "Closed loop, with the refined model as the plant", |_| {});
+    let measures: [(&str, &str, fn(&LoopRun) -> Option<f64>); 5] = [
+        ("displacement, std", "m", |run| Some(run.x_m.std)),
+        ("displacement, peak to peak", "m", |run| Some(run.x_m.peak_to_peak)),
+        ("pitch, std", "rad", |run| Some(run.pitch_rad.std)),
+        ("limit cycle, amplitude", "m", |run| run.limit_cycle.map(|cycle| cycle.amplitude_m)),
+        ("limit cycle, frequency", "Hz", |run| run.limit_cycle.map(|cycle| cycle.frequency_hz)),
+    ];
+    for pair in &closed_loop.scenarios {
+        let fell = |run: &LoopRun| if run.fell { ", fell" } else { "" };
+        let title = format!("{}: before{}, after{}", pair.scenario, fell(&pair.before), fell(&pair.after));
+        ui.label(RichText::new(title).strong());
+        let rows: Vec<Row> = measures
+            .iter()
+            .map(|(name, unit, of)| Row {
+                name: (*name).to_owned(),
+                values: [of(&pair.before), of(&pair.after)],
+                unit,
+            })
+            .filter(|row| row.values.iter().any(Option::is_some))
+            .collect();
+        table_ui(&format!("closed loop {}", pair.scenario), &rows, true, ui);
+    }
+    hint_ui(ui, "Before: the controller of the declared model; after: the one made from the refined model.");
+    for fed in &closed_loop.feedforward {
+        let used = if fed.used { "fed forward" } else { "not fed forward" };
+        hint_ui(ui, format!("{}: {used}, {}", fed.effect.id, fed.reason));
     }
 }
 

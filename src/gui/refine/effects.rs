@@ -2,12 +2,16 @@
 
 use egui::{Frame, Grid, RichText, Ui};
 use flqr_core::effects::Place;
-use flqr_core::refine::{Found, Refinement, Verdict};
+use flqr_core::refine::{Found, NextExperiment, Refinement, Unexplained, Verdict};
+use flqr_core::simulate::Scenario;
 
+use super::command::RefineCommand;
 use super::run::verdict_text;
 use super::strip::{StepState, Tone};
+use crate::command::Command;
+use crate::context::ViewContext;
 use crate::theme::palette;
-use crate::widgets::{hint_ui, mono, shown};
+use crate::widgets::{hint_ui, mono, section_ui, shown, warning_ui};
 
 /// How this step stands.
 pub(super) fn state(found: Option<&Refinement>, in_model: bool) -> StepState {
@@ -35,30 +39,83 @@ pub(super) fn verdict_ui(found: &Refinement, ui: &mut Ui) {
     ui.add(egui::Label::new(text).wrap());
 }
 
-/// One effect: what it is, its size, and what this log cannot tell from it.
-pub(super) fn effect_ui(found: &Found, ui: &mut Ui) {
+/// One effect: what it is, its size, what this log cannot tell from it, and whether it is to be added.
+pub(super) fn effect_ui(found: &Found, added: &mut bool, ui: &mut Ui) {
     let kind = found.effect.kind();
     Frame::group(ui.style()).show(ui, |ui| {
         ui.set_min_width(ui.available_width());
         ui.horizontal_wrapped(|ui| {
-            ui.label(RichText::new(kind.id).strong());
+            let help = "An effect that is not ticked stays out of the model that is used and saved";
+            let tick = ui.checkbox(added, "add it").on_hover_text(help);
+            tick.accessible_name(format!("add {}", kind.id));
+            ui.label(RichText::new(kind.id).strong().size(15.0));
             if let Some(motor) = found.effect.motor() {
                 ui.label(RichText::new(format!("{motor} motor")).small());
             }
-            hint_ui(ui, place_text(kind.place));
             if found.error_drop_percent.is_finite() {
                 let text = format!("held-out error lower by {} %", shown(found.error_drop_percent, 3));
                 ui.label(RichText::new(text).color(palette(ui.visuals()).good));
             }
         });
-        hint_ui(ui, format!("{}.", kind.summary));
+        hint_ui(ui, format!("{}. Acts: {}.", sentence_case(kind.summary), place_text(kind.place)));
         sizes_ui(found, ui);
         if !found.ambiguous_with.is_empty() {
             let others: Vec<&str> = found.ambiguous_with.iter().map(|kind| kind.id).collect();
             let text = format!("This log cannot tell it from {}.", others.join(", "));
-            crate::widgets::warning_ui(ui, text).on_hover_text(kind.separated_by);
+            warning_ui(ui, text).on_hover_text(kind.separated_by);
         }
     });
+}
+
+/// What no effect explains; gives the variable that is to be looked at.
+pub(super) fn unexplained_ui(unexplained: &Unexplained, ui: &mut Ui) -> Option<String> {
+    if unexplained.description.is_empty() {
+        return None;
+    }
+    section_ui(ui, "Unexplained", |_| {});
+    warning_ui(ui, format!("{}.", sentence_case(&unexplained.description)));
+    let mut chosen = None;
+    ui.horizontal_wrapped(|ui| {
+        for (index, variable) in unexplained.depends_on.iter().enumerate() {
+            let share = unexplained.shares.get(index).filter(|share| share.is_finite());
+            let share = share.map_or_else(String::new, |share| format!(", {} %", shown(100.0 * share, 3)));
+            let look = ui.button(format!("over {variable}{share}"));
+            if look.on_hover_text("Look at the residual over it").clicked() {
+                chosen = Some(variable.clone());
+            }
+        }
+    });
+    chosen
+}
+
+/// What to record next.
+pub(super) fn next_ui(context: &ViewContext<'_>, next: &NextExperiment, ui: &mut Ui) {
+    section_ui(ui, "Next experiment", |_| {});
+    ui.add(egui::Label::new(format!("{}.", sentence_case(&next.summary))).wrap());
+    if next.separation.is_finite() && next.separation > 0.0 {
+        let separation = shown(next.separation, 3);
+        hint_ui(ui, format!("The residuals would be {separation} standard deviations of the noise apart."));
+    }
+    ui.horizontal_wrapped(|ui| {
+        let scenario = next.scenario.as_deref().and_then(|name| name.parse::<Scenario>().ok());
+        if let Some(scenario) = scenario {
+            let start = ui.button("Start on the simulated robot");
+            let help = format!("Go to the experiments with “{}”", scenario.title());
+            if start.on_hover_text(help).clicked() {
+                context.commands.send(Command::Refine(RefineCommand::Simulate(scenario)));
+            }
+        }
+        if let Some(command) = &next.command
+            && ui.button("Copy its command").on_hover_text(command).clicked()
+        {
+            ui.ctx().copy_text(command.clone());
+        }
+    });
+}
+
+fn sentence_case(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map(|first| first.to_uppercase().chain(letters).collect()).unwrap_or_default()
 }
 
 fn sizes_ui(found: &Found, ui: &mut Ui) {

@@ -1,10 +1,12 @@
 //! The *Refine* page: logs and search at the left, the steps of the loop above, one of them in the middle.
 
+mod candidates;
 mod command;
 mod compare;
 mod effects;
 mod form;
 mod health;
+mod residual;
 mod run;
 mod save;
 mod sources;
@@ -12,20 +14,23 @@ mod strip;
 
 use std::path::PathBuf;
 
-use egui::{CentralPanel, Frame, Margin, Panel, ScrollArea, Ui};
+use egui::{CentralPanel, Frame, Margin, Panel, RichText, ScrollArea, Ui};
 use flqr_core::model_file::Model;
 use flqr_core::refine::{Refinement, Verdict};
 use flqr_core::report::{Block, Tone as ReportTone};
+use flqr_core::simulate::Scenario;
 
 use crate::column_map::ColumnMapForm;
 use crate::command::Command;
 use crate::context::ViewContext;
 use crate::job::Waker;
 use crate::session::Session;
+use crate::theme::palette;
 use crate::widgets::{hint_ui, section_ui, warning_ui};
 pub(crate) use command::{RefineCommand, RefineFile};
+use residual::ResidualStep;
 pub(crate) use run::Question;
-use run::{Answered, Made, Run, Settings};
+use run::{Answered, Drained, Made, Run, Settings};
 pub(crate) use save::SavedAs;
 use save::Saver;
 use sources::Sources;
@@ -38,6 +43,13 @@ pub(crate) struct RefineTab {
     run: Run,
     saver: Saver,
     step: Step,
+    residual: ResidualStep,
+    /// Of each effect that was found, whether it is to be added.
+    ticks: Vec<bool>,
+    /// The answer that they belong to.
+    ticked: u64,
+    /// The refined model with the effects that are ticked.
+    chosen: Option<Model>,
 }
 
 /// What the page's commands may use of the window.
@@ -53,6 +65,8 @@ pub(crate) struct Surroundings<'a> {
 pub(crate) struct Done {
     /// For the status line.
     pub(crate) said: Option<String>,
+    /// An experiment to go to.
+    pub(crate) scenario: Option<Scenario>,
     /// A log to remember.
     pub(crate) log: Option<PathBuf>,
 }
@@ -74,6 +88,10 @@ impl RefineTab {
             run: Run::default(),
             saver: Saver::default(),
             step: Step::default(),
+            residual: ResidualStep::default(),
+            ticks: Vec::new(),
+            ticked: 0,
+            chosen: None,
         }
     }
 
@@ -113,6 +131,7 @@ impl RefineTab {
             RefineCommand::Start(question) => self.start(question, around)?,
             RefineCommand::Cancel => self.run.cancel(),
             RefineCommand::Use => done.said = Some(self.put_into(around.session)?),
+            RefineCommand::Simulate(scenario) => done.scenario = Some(scenario),
             RefineCommand::Save { saved_as, path, replace } => {
                 self.save(saved_as, path, replace, &around)?;
             }
@@ -149,7 +168,7 @@ impl RefineTab {
 
     fn standing_of_refined(&self, session: &Session) -> Option<Standing> {
         let refined = self.run.refined.as_ref()?;
-        Some(self.standing(refined, Some(&refined.answer.model), session))
+        Some(self.standing(refined, self.chosen.as_ref(), session))
     }
 
     fn found(&self) -> Option<&Refinement> {
@@ -165,8 +184,18 @@ impl RefineTab {
             Some(Standing::InModel) => return Err("It is in the model already.".to_owned()),
             Some(Standing::Fresh) | None => {}
         }
-        session.rig = refined.answer.model.rig.clone();
+        let Some(chosen) = self.chosen.as_ref().filter(|chosen| **chosen != refined.made.model) else {
+            return Err("Nothing is ticked: the model stays as it is.".to_owned());
+        };
+        session.rig = chosen.rig.clone();
         Ok("The model has what was found; the simulated robot too.".to_owned())
+    }
+
+    /// Ids of the effects that are found and not ticked.
+    fn left_out(&self) -> Vec<&'static str> {
+        let found = self.found().map_or(&[][..], |found| &found.effects);
+        let left_out = found.iter().zip(&self.ticks).filter(|(_, tick)| !**tick);
+        left_out.map(|(found, _)| found.effect.id()).collect()
     }
 
     fn save(
@@ -179,14 +208,20 @@ impl RefineTab {
         let Some(refined) = &self.run.refined else {
             return Err("There is nothing to save: search first.".to_owned());
         };
-        let remark = match self.standing(refined, Some(&refined.answer.model), around.session) {
+        let remark = match self.standing(refined, self.chosen.as_ref(), around.session) {
             Standing::Stale(why) => Some(format!("Stale when it was saved. {why}")),
             Standing::Fresh | Standing::InModel => None,
         };
-        let (mut document, model) = (refined.answer.document.clone(), refined.answer.model.clone());
+        let mut document = refined.answer.document.clone();
+        let model = self.chosen.clone().unwrap_or_else(|| refined.answer.model.clone());
         let said = remark.clone();
+        let left_out = self.left_out().join(", ");
         let content = move || match saved_as {
             SavedAs::Report => {
+                if !left_out.is_empty() {
+                    let text = format!("{left_out}: not taken over into the model");
+                    document.blocks.insert(0, Block::notice(ReportTone::Note, "Left out", text));
+                }
                 if let Some(remark) = said {
                     document.blocks.insert(0, Block::notice(ReportTone::Warning, "Stale", remark));
                 }
@@ -208,8 +243,15 @@ impl RefineTab {
     /// Takes in what the workers have brought; a sentence if something ended.
     pub(crate) fn drain(&mut self) -> Option<String> {
         let loaded = self.sources.drain();
-        let Some((question, text)) = self.run.drain() else { return loaded };
-        if self.run.problem.is_none() {
+        let Some(Drained { question, text, answered }) = self.run.drain() else { return loaded };
+        if let Some(refined) = &self.run.refined
+            && self.ticked != refined.generation
+        {
+            self.ticked = refined.generation;
+            self.ticks = vec![true; refined.answer.effects.len()];
+            self.chosen = Some(refined.answer.model.clone());
+        }
+        if answered {
             self.step = match (question, self.found().map(|found| found.verdict)) {
                 (Question::Residual, _) => Step::Residual,
                 (Question::Refine, Some(Verdict::DataUnfit)) => Step::Health,
@@ -243,6 +285,7 @@ impl RefineTab {
             "problem": self.run.problem,
             "residual": self.run.residual.as_ref().map(|residual| &residual.answer),
             "refinement": self.found(),
+            "ticks": self.ticks,
             "standing": standing,
             "command": command,
         })
@@ -269,7 +312,12 @@ impl RefineTab {
             });
         let middle = Frame::central_panel(ui.style()).inner_margin(Margin::symmetric(10, 6));
         CentralPanel::default().frame(middle).show(ui, |ui| {
-            ScrollArea::vertical().auto_shrink(false).show(ui, |ui| self.step_ui(context, ui));
+            self.stale_ui(context, ui);
+            if self.step == Step::Residual && (self.run.refined.is_some() || self.run.residual.is_some()) {
+                self.residual.ui(self.run.refined.as_ref(), self.run.residual.as_ref(), ui);
+            } else {
+                ScrollArea::both().auto_shrink(false).show(ui, |ui| self.step_ui(context, ui));
+            }
         });
     }
 
@@ -279,8 +327,8 @@ impl RefineTab {
         let in_model = matches!(standing, Some(Standing::InModel));
         let mut states = [
             health::state(&self.run, &self.sources),
-            self.residual_state(),
-            effects::state(found, in_model),
+            residual::state(self.run.refined.as_ref(), self.run.residual.as_ref()),
+            candidates::state(found),
             effects::state(found, in_model),
             compare::state(found),
         ];
@@ -298,41 +346,46 @@ impl RefineTab {
         states
     }
 
-    fn residual_state(&self) -> StepState {
-        StepState::new("not worked out", Tone::Open)
-    }
-
-    fn step_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
+    fn stale_ui(&self, context: &ViewContext<'_>, ui: &mut Ui) {
         if let (Some(Standing::Stale(why)), true) =
             (self.standing_of_refined(context.session), self.step != Step::Health)
         {
-            warning_ui(ui, why);
-        }
-        match self.step {
-            Step::Health => health::ui(&self.run, &self.sources, ui),
-            Step::Residual => match &self.run.residual {
-                Some(residual) => compare::residual_ui(&residual.answer, ui),
-                None => nothing_yet_ui(ui),
-            },
-            Step::Candidates | Step::Add => self.add_ui(context, ui),
-            Step::Compare => match self.found() {
-                Some(found) => compare::ui(found, ui),
-                None => nothing_yet_ui(ui),
-            },
+            warning_ui(ui, format!("Stale. {why}"));
         }
     }
 
-    fn add_ui(&self, context: &ViewContext<'_>, ui: &mut Ui) {
-        let Some(found) = self.found() else { return nothing_yet_ui(ui) };
-        effects::verdict_ui(found, ui);
-        for effect in &found.effects {
-            effects::effect_ui(effect, ui);
+    fn step_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
+        match (self.step, self.found()) {
+            (Step::Health, _) => health::ui(&self.run, &self.sources, ui),
+            (Step::Residual, _) | (_, None) => nothing_yet_ui(ui),
+            (Step::Candidates, Some(found)) => candidates::ui(found, ui),
+            (Step::Add, Some(_)) => self.add_ui(context, ui),
+            (Step::Compare, Some(found)) => compare::ui(found, ui),
         }
-        let ready = matches!(self.standing_of_refined(context.session), Some(Standing::Fresh));
-        let button =
-            ui.add_enabled(ready && !found.effects.is_empty(), egui::Button::new("Use in the model"));
-        if button.on_hover_text("Put what was found into the model of this window").clicked() {
-            context.commands.send(Command::Refine(RefineCommand::Use));
+    }
+
+    fn add_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
+        let standing = self.standing_of_refined(context.session);
+        let Some(refined) = &self.run.refined else { return };
+        let found = &refined.answer;
+        effects::verdict_ui(found, ui);
+        let before = self.ticks.clone();
+        for (effect, tick) in found.effects.iter().zip(&mut self.ticks) {
+            effects::effect_ui(effect, tick, ui);
+        }
+        if self.ticks != before {
+            self.chosen = Some(refined.made.refined_with(found, &self.ticks));
+        }
+        if !found.effects.is_empty() {
+            use_ui(context, standing, self.ticks.contains(&true), ui);
+        }
+        let look = effects::unexplained_ui(&found.unexplained, ui);
+        if let Some(next) = &found.next_experiment {
+            effects::next_ui(context, next, ui);
+        }
+        if let Some(variable) = look {
+            self.residual.choose(&variable);
+            self.step = Step::Residual;
         }
     }
 
@@ -355,6 +408,29 @@ impl RefineTab {
             hint_ui(ui, "No file holds this very model: save it, put its path in place of MODEL.toml.");
         }
     }
+}
+
+/// The way into the session's model.
+fn use_ui(context: &ViewContext<'_>, standing: Option<Standing>, ticked: bool, ui: &mut Ui) {
+    ui.horizontal_wrapped(|ui| {
+        let ready = ticked && matches!(standing, Some(Standing::Fresh));
+        let text = RichText::new("Use in the model").strong();
+        let button = egui::Button::new(text).fill(ui.visuals().selection.bg_fill);
+        let help = "Put the ticked effects and the corrected numbers into the model of this window";
+        if ui.add_enabled(ready, button).on_hover_text(help).clicked() {
+            context.commands.send(Command::Refine(RefineCommand::Use));
+        }
+        match standing {
+            Some(Standing::InModel) => {
+                let color = palette(ui.visuals()).good;
+                ui.label(RichText::new("It is in the model of this window.").color(color));
+            }
+            Some(Standing::Fresh) if !ticked => {
+                hint_ui(ui, "Nothing is ticked.");
+            }
+            _ => {}
+        }
+    });
 }
 
 fn nothing_yet_ui(ui: &mut Ui) {

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use flqr_core::model_file::Model;
-use flqr_core::record::Log;
+use flqr_core::record::{Log, LogKind};
 use flqr_core::refine::{self, Options, RefineError, Refinement, Residual, Verdict};
 use flqr_core::robot::Motor;
 
@@ -66,6 +66,14 @@ pub(super) struct Made {
 }
 
 impl Made {
+    /// The refined model without the effects that are not ticked.
+    pub(super) fn refined_with(&self, found: &Refinement, ticks: &[bool]) -> Model {
+        let whole_machine = self.inputs.iter().any(|input| input.log.serves(LogKind::Robot));
+        let motor = (!whole_machine).then_some(self.settings.motor);
+        let left_out = found.effects.iter().zip(ticks).filter(|(_, tick)| !**tick);
+        left_out.fold(found.model.clone(), |model, (found, _)| refine::without(model, &found.effect, motor))
+    }
+
     /// The command that gives the same answer; `model` is the file that holds this very model.
     pub(super) fn command_line(&self, question: Question, model: Option<&Path>) -> String {
         let file = |path: &Path| quoted(&path.display().to_string());
@@ -124,6 +132,15 @@ struct Running {
     share: f64,
 }
 
+/// How a question ended.
+pub(super) struct Drained {
+    pub(super) question: Question,
+    /// A sentence about it.
+    pub(super) text: String,
+    /// Whether there is another answer.
+    pub(super) answered: bool,
+}
+
 /// Puts questions, watches and ends them.
 #[derive(Default)]
 pub(super) struct Run {
@@ -164,8 +181,8 @@ impl Run {
         }
     }
 
-    /// The question that has been answered or not, with a sentence about it.
-    pub(super) fn drain(&mut self) -> Option<(Question, String)> {
+    /// The question that has just ended.
+    pub(super) fn drain(&mut self) -> Option<Drained> {
         let running = self.running.as_mut()?;
         let (shares, outcome) = running.job.poll();
         running.share = shares.last().copied().unwrap_or(running.share);
@@ -177,6 +194,7 @@ impl Run {
         let Running { question, made, model_path, .. } = self.running.take()?;
         self.generation += 1;
         let generation = self.generation;
+        let answered = matches!(end, End::Answered(_));
         let text = match end {
             End::Cancelled => "Cancelled: what was found before is still shown.".to_owned(),
             End::Refused(problem) => {
@@ -193,7 +211,7 @@ impl Run {
                 text
             }
         };
-        Some((question, text))
+        Some(Drained { question, text, answered })
     }
 }
 

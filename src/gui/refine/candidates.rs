@@ -1,0 +1,78 @@
+//! Every effect that was tried, best first, and what became of it.
+
+use egui::{Grid, RichText, Sense, Ui, vec2};
+use flqr_core::refine::{Fate, Refinement, Tried};
+
+use super::effects::place_text;
+use super::strip::{StepState, Tone};
+use crate::theme::palette;
+use crate::widgets::{hint_ui, mono, section_ui, shown};
+
+/// Width of the bar of a whole gain.
+const BAR: f32 = 90.0;
+
+/// How this step stands.
+pub(super) fn state(found: Option<&Refinement>) -> StepState {
+    let Some(found) = found else { return StepState::new("nothing tried", Tone::Open) };
+    let added = found.candidates.iter().filter(|tried| tried.fate == Fate::Added).count();
+    match found.candidates.len() {
+        0 => StepState::new("nothing tried", Tone::Open),
+        count => StepState::new(format!("{count} tried, {added} added"), Tone::Plain),
+    }
+}
+
+pub(super) fn ui(found: &Refinement, ui: &mut Ui) {
+    section_ui(ui, "What was tried", |_| {});
+    if found.candidates.is_empty() {
+        hint_ui(ui, "Nothing was tried: the logs cannot answer, for the reasons under Health.");
+        return;
+    }
+    hint_ui(
+        ui,
+        "Gain: by how much the error on left-out blocks is lower with the effect alone beside the declared model. z: its size in standard errors. Point at an effect for what it is and what shows it.",
+    );
+    ui.add_space(4.0);
+    let grid = Grid::new("candidates").num_columns(6).striped(true).spacing([16.0, 3.0]);
+    grid.show(ui, |ui| {
+        for title in ["", "effect", "detail", "gain on left-out blocks", "z", "what became of it"] {
+            hint_ui(ui, title);
+        }
+        ui.end_row();
+        for (index, tried) in found.candidates.iter().enumerate() {
+            row_ui(index, tried, ui);
+        }
+    });
+}
+
+fn row_ui(index: usize, tried: &Tried, ui: &mut Ui) {
+    let colors = palette(ui.visuals());
+    let added = tried.fate == Fate::Added;
+    ui.label(mono(format!("{}", index + 1)).weak());
+    let name = RichText::new(tried.kind.id);
+    let name = if added { name.strong().color(colors.accent) } else { name };
+    let kind = tried.kind;
+    ui.add(egui::Label::new(name).extend().sense(Sense::hover())).on_hover_text(format!(
+        "{}.\nActs: {}.\nShown by: {}.",
+        kind.summary,
+        place_text(kind.place),
+        kind.separated_by
+    ));
+    ui.add(egui::Label::new(RichText::new(&tried.detail).small()).extend());
+    ui.horizontal(|ui| {
+        let share = (tried.gain_percent / 100.0).clamp(0.0, 1.0) as f32;
+        let (rect, _) = ui.allocate_exact_size(vec2(BAR, 10.0), Sense::hover());
+        let share = if share.is_finite() { share } else { 0.0 };
+        let bar = egui::Rect::from_min_size(rect.min, vec2(share * rect.width(), rect.height()));
+        ui.painter().rect_filled(rect, 2.0, ui.visuals().faint_bg_color);
+        ui.painter().rect_filled(bar, 2.0, if added { colors.accent } else { colors.reference });
+        ui.label(mono(format!("{} %", shown(tried.gain_percent, 3))));
+    });
+    ui.label(mono(shown(tried.z, 3)));
+    let color = match tried.fate {
+        Fate::Added => colors.good,
+        Fate::NotToldFrom(_) => colors.warning,
+        Fate::Explained | Fate::TooSmall | Fate::NotSure | Fate::NotTestable => ui.visuals().text_color(),
+    };
+    ui.add(egui::Label::new(RichText::new(tried.fate.to_string()).color(color)).extend());
+    ui.end_row();
+}
