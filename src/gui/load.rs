@@ -59,6 +59,11 @@ impl Loader {
         self.log.as_deref()
     }
 
+    /// Holds a log that no file has.
+    pub(crate) fn holding(log: LoadedLog) -> Self {
+        Self { log: Some(Box::new(log)), ..Self::default() }
+    }
+
     pub(crate) fn is_running(&self) -> bool {
         self.job.is_some()
     }
@@ -132,16 +137,27 @@ fn load(path: &Path, map: &ColumnMap, generation: u64, reporter: &Reporter<LoadP
     let reader = BufReader::with_capacity(1 << 16, file);
     let log =
         read_log(reader, &source, &ReadOptions::new(map), &mut watch).map_err(|error| error.to_string())?;
-    let health = data_health(&log);
-    Ok(Box::new(LoadedLog {
-        kind: log.kind().map_err(|error| error.to_string()),
-        axis: axis(&log),
-        rate_hz: rate_hz(&log),
-        health,
-        log: Arc::new(log),
-        path: path.to_owned(),
-        generation,
-    }))
+    Ok(Box::new(LoadedLog::new(log, path, generation)))
+}
+
+impl LoadedLog {
+    fn new(log: Log, path: &Path, generation: u64) -> Self {
+        Self {
+            kind: log.kind().map_err(|error| error.to_string()),
+            axis: axis(&log),
+            rate_hz: rate_hz(&log),
+            health: data_health(&log),
+            log: Arc::new(log),
+            path: path.to_owned(),
+            generation,
+        }
+    }
+
+    /// A log that was made in this program.
+    pub(crate) fn made(log: Log) -> Self {
+        let path = PathBuf::from(&log.source);
+        Self::new(log, &path, 0)
+    }
 }
 
 fn axis(log: &Log) -> Axis {

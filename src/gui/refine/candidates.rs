@@ -1,7 +1,7 @@
 //! Every effect that was tried, best first, and what became of it.
 
 use egui::{Grid, RichText, Sense, Ui, vec2};
-use flqr_core::refine::{Fate, Refinement, Tried};
+use flqr_core::refine::{Fate, Refinement, Tried, Verdict};
 
 use super::effects::place_text;
 use super::strip::{StepState, Tone};
@@ -16,7 +16,7 @@ pub(super) fn state(found: Option<&Refinement>) -> StepState {
     let Some(found) = found else { return StepState::new("nothing tried", Tone::Open) };
     let added = found.candidates.iter().filter(|tried| tried.fate == Fate::Added).count();
     match found.candidates.len() {
-        0 => StepState::new("nothing tried", Tone::Open),
+        0 => StepState::new("nothing listed", Tone::Open),
         count => StepState::new(format!("{count} tried, {added} added"), Tone::Plain),
     }
 }
@@ -24,7 +24,15 @@ pub(super) fn state(found: Option<&Refinement>) -> StepState {
 pub(super) fn ui(found: &Refinement, ui: &mut Ui) {
     section_ui(ui, "What was tried", |_| {});
     if found.candidates.is_empty() {
-        hint_ui(ui, "Nothing was tried: the logs cannot answer, for the reasons under Health.");
+        hint_ui(
+            ui,
+            match found.verdict {
+                Verdict::DataUnfit => {
+                    "Nothing was tried: the logs cannot answer, for the reasons under Health."
+                }
+                _ => "This search does not list what it tried.",
+            },
+        );
         return;
     }
     hint_ui(

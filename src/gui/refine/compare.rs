@@ -80,10 +80,13 @@ pub(super) fn ui(found: &Refinement, ui: &mut Ui) {
     }
 }
 
+/// Name, unit and value of what is told of a run.
+type Measure = (&'static str, &'static str, fn(&LoopRun) -> Option<f64>);
+
 /// The refined model as the plant, under both controllers.
 fn closed_loop_ui(closed_loop: &ClosedLoop, ui: &mut Ui) {
     section_ui(ui, "Closed loop, with the refined model as the plant", |_| {});
-    let measures: [(&str, &str, fn(&LoopRun) -> Option<f64>); 5] = [
+    let measures: [Measure; 5] = [
         ("displacement, std", "m", |run| Some(run.x_m.std)),
         ("displacement, peak to peak", "m", |run| Some(run.x_m.peak_to_peak)),
         ("pitch, std", "rad", |run| Some(run.pitch_rad.std)),

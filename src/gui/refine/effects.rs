@@ -2,7 +2,7 @@
 
 use egui::{Frame, Grid, RichText, Ui};
 use flqr_core::effects::Place;
-use flqr_core::refine::{Found, NextExperiment, Refinement, Unexplained, Verdict};
+use flqr_core::refine::{Found, NextExperiment, Refinement, Truth, Unexplained, Verdict};
 use flqr_core::simulate::Scenario;
 
 use super::command::RefineCommand;
@@ -37,6 +37,15 @@ pub(super) fn verdict_ui(found: &Refinement, ui: &mut Ui) {
     };
     let text = RichText::new(format!("{}.", verdict_text(found))).heading().color(color);
     ui.add(egui::Label::new(text).wrap());
+}
+
+/// What the simulated robot of a demonstration had.
+pub(super) fn truth_ui(truth: &Truth, ui: &mut Ui) {
+    let parameters = truth.effect.parameters().iter();
+    let sizes: Vec<String> = parameters.map(|(key, value)| format!("{key} {}", shown(*value, 3))).collect();
+    let verdict = if truth.named { "It was found." } else { "It was not found by its name." };
+    let id = truth.effect.id();
+    hint_ui(ui, format!("In truth the simulated robot has {id}: {}. {verdict}", sizes.join(", ")));
 }
 
 /// One effect: what it is, its size, what this log cannot tell from it, and whether it is to be added.

@@ -5,7 +5,7 @@ use flqr_core::model_file::Rig;
 use flqr_core::robot::Motor;
 
 use super::command::RefineCommand;
-use super::run::{Question, Run, Settings};
+use super::run::{Question, Run, Settings, is_of_demo};
 use super::sources::Sources;
 use crate::command::Command;
 use crate::context::ViewContext;
@@ -65,6 +65,7 @@ fn run_ui(context: &ViewContext<'_>, sources: &Sources, run: &Run, ui: &mut Ui) 
         let name = match question {
             Question::Residual => "residual",
             Question::Refine => "search",
+            Question::Demo => "demonstration",
         };
         let text = RichText::new(format!("{name} {:.0} %", 100.0 * share)).small();
         ui.add(ProgressBar::new(share as f32).text(text)).accessible_name("progress of the search");
@@ -87,6 +88,18 @@ fn run_ui(context: &ViewContext<'_>, sources: &Sources, run: &Run, ui: &mut Ui) 
     });
     if let Some(why_not) = why_not {
         hint_ui(ui, why_not);
+    }
+    demo_ui(context, sources, ui);
+}
+
+/// The whole loop without a file.
+fn demo_ui(context: &ViewContext<'_>, sources: &Sources, ui: &mut Ui) {
+    let ready = is_of_demo(&context.session.model()) && !sources.is_loading();
+    let demo = ui.add_enabled(ready, Button::new("Try it on a demo robot"));
+    let help = "Records a simulated robot with something that its model does not have, and looks for it; the seed chooses what. The logs of the list give way to these records";
+    let why_not = "Needs the preset of the paper's robot, unchanged: open it on the Tune page";
+    if demo.on_hover_text(help).on_disabled_hover_text(why_not).clicked() {
+        context.commands.send(Command::Refine(RefineCommand::Start(Question::Demo)));
     }
 }
 

@@ -30,7 +30,7 @@ use crate::widgets::{hint_ui, section_ui, warning_ui};
 pub(crate) use command::{RefineCommand, RefineFile};
 use residual::ResidualStep;
 pub(crate) use run::Question;
-use run::{Answered, Drained, Made, Run, Settings};
+use run::{Answered, Drained, Made, Run, Settings, is_of_demo};
 pub(crate) use save::SavedAs;
 use save::Saver;
 use sources::Sources;
@@ -140,10 +140,13 @@ impl RefineTab {
     }
 
     fn start(&mut self, question: Question, around: Surroundings<'_>) -> Result<(), String> {
-        if let Some(why_not) = form::why_not(&self.sources) {
+        if let (Some(why_not), true) = (form::why_not(&self.sources), question != Question::Demo) {
             return Err(why_not.to_owned());
         }
         let made = self.made(around.session);
+        if question == Question::Demo && !is_of_demo(&made.model) {
+            return Err("The demonstration needs the preset of the paper's robot, unchanged.".to_owned());
+        }
         self.run.start(question, made, around.model_path, around.waker)
     }
 
@@ -243,7 +246,10 @@ impl RefineTab {
     /// Takes in what the workers have brought; a sentence if something ended.
     pub(crate) fn drain(&mut self) -> Option<String> {
         let loaded = self.sources.drain();
-        let Some(Drained { question, text, answered }) = self.run.drain() else { return loaded };
+        let Some(Drained { question, text, answered, records }) = self.run.drain() else { return loaded };
+        if let Some(records) = records {
+            self.sources.replace(records);
+        }
         if let Some(refined) = &self.run.refined
             && self.ticked != refined.generation
         {
@@ -254,8 +260,8 @@ impl RefineTab {
         if answered {
             self.step = match (question, self.found().map(|found| found.verdict)) {
                 (Question::Residual, _) => Step::Residual,
-                (Question::Refine, Some(Verdict::DataUnfit)) => Step::Health,
-                (Question::Refine, _) => Step::Add,
+                (Question::Refine | Question::Demo, Some(Verdict::DataUnfit)) => Step::Health,
+                (Question::Refine | Question::Demo, _) => Step::Add,
             };
         }
         Some(text)
@@ -286,6 +292,7 @@ impl RefineTab {
             "residual": self.run.residual.as_ref().map(|residual| &residual.answer),
             "refinement": self.found(),
             "ticks": self.ticks,
+            "truth": self.run.truth,
             "standing": standing,
             "command": command,
         })
@@ -369,6 +376,9 @@ impl RefineTab {
         let Some(refined) = &self.run.refined else { return };
         let found = &refined.answer;
         effects::verdict_ui(found, ui);
+        if let Some(truth) = &self.run.truth {
+            effects::truth_ui(truth, ui);
+        }
         let before = self.ticks.clone();
         for (effect, tick) in found.effects.iter().zip(&mut self.ticks) {
             effects::effect_ui(effect, tick, ui);

@@ -2,14 +2,18 @@
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 
-use flqr_core::model_file::Model;
+use flqr_core::model_file::{Model, presets};
 use flqr_core::record::{Log, LogKind};
-use flqr_core::refine::{self, Options, RefineError, Refinement, Residual, Verdict};
+use flqr_core::refine::{
+    self, Demonstration, DemonstrationError, Options, RefineError, Refinement, Residual, Truth, Verdict,
+};
 use flqr_core::robot::Motor;
 
 use super::sources::Input;
 use crate::job::{Job, Outcome, Reporter, Waker};
+use crate::load::LoadedLog;
 use crate::shell_word::quoted;
 
 /// What can be asked.
@@ -19,6 +23,8 @@ pub(crate) enum Question {
     Residual,
     /// What the model lacks.
     Refine,
+    /// The same of a simulated robot that is recorded first.
+    Demo,
 }
 
 impl Question {
@@ -27,6 +33,7 @@ impl Question {
         match self {
             Self::Residual => "residual",
             Self::Refine => "refine",
+            Self::Demo => "demo",
         }
     }
 }
@@ -76,6 +83,9 @@ impl Made {
 
     /// The command that gives the same answer; `model` is the file that holds this very model.
     pub(super) fn command_line(&self, question: Question, model: Option<&Path>) -> String {
+        if self.inputs.iter().any(|input| input.made) {
+            return format!("flqr demo --seed {}", self.settings.seed);
+        }
         let file = |path: &Path| quoted(&path.display().to_string());
         let mut line = format!("flqr {} {}", question.name(), model.map_or("MODEL.toml".into(), file));
         for input in self.inputs.iter().filter(|input| !input.held_out || question == Question::Residual) {
@@ -116,6 +126,7 @@ pub(super) struct Answered<T> {
 enum Answer {
     Residual(Box<Residual>),
     Refined(Box<Refinement>),
+    Shown(Box<Demonstration>),
 }
 
 enum End {
@@ -139,6 +150,8 @@ pub(super) struct Drained {
     pub(super) text: String,
     /// Whether there is another answer.
     pub(super) answered: bool,
+    /// What was recorded for it, where it was.
+    pub(super) records: Option<Vec<LoadedLog>>,
 }
 
 /// Puts questions, watches and ends them.
@@ -147,6 +160,8 @@ pub(super) struct Run {
     running: Option<Running>,
     pub(super) residual: Option<Answered<Box<Residual>>>,
     pub(super) refined: Option<Answered<Box<Refinement>>>,
+    /// What the simulated robot of the last demonstration had.
+    pub(super) truth: Option<Truth>,
     pub(super) problem: Option<String>,
     generation: u64,
 }
@@ -195,6 +210,7 @@ impl Run {
         self.generation += 1;
         let generation = self.generation;
         let answered = matches!(end, End::Answered(_));
+        let mut records = None;
         let text = match end {
             End::Cancelled => "Cancelled: what was found before is still shown.".to_owned(),
             End::Refused(problem) => {
@@ -207,35 +223,71 @@ impl Run {
             }
             End::Answered(Answer::Refined(answer)) => {
                 let text = format!("{}.", verdict_text(&answer));
+                self.truth = None;
                 self.refined = Some(Answered { made, model_path, answer, generation });
                 text
             }
+            End::Answered(Answer::Shown(shown)) => {
+                let Demonstration { found, truth, logs } = *shown;
+                let text = format!("{}.", verdict_text(&found));
+                let logs: Vec<LoadedLog> = logs.into_iter().map(LoadedLog::made).collect();
+                let made = Made { inputs: logs.iter().map(Input::made).collect(), ..made };
+                self.truth = Some(truth);
+                self.refined = Some(Answered { made, model_path, answer: Box::new(found), generation });
+                records = Some(logs);
+                text
+            }
         };
-        Some(Drained { question, text, answered })
+        Some(Drained { question, text, answered, records })
     }
 }
 
 fn answer(question: Question, made: &Made, watch: &mut dyn FnMut(f64) -> ControlFlow<()>) -> End {
+    let mut cancelled = false;
+    let mut watch = |share: f64| {
+        let flow = watch(share);
+        cancelled |= flow.is_break();
+        flow
+    };
+    let answer = try_answer(question, made, &mut watch);
+    match answer {
+        Ok(answer) => End::Answered(answer),
+        Err(_) if cancelled => End::Cancelled,
+        Err(problem) => End::Refused(problem),
+    }
+}
+
+fn try_answer(
+    question: Question,
+    made: &Made,
+    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> Result<Answer, String> {
     let logs = |held_out: bool| -> Vec<Log> {
         let of_part = made.inputs.iter().filter(|input| input.held_out == held_out);
         of_part.map(|input| (*input.log).clone()).collect()
     };
-    let (mut logs, held_out) = (logs(false), logs(true));
+    let said = |problem: RefineError| problem.to_string();
     let options = made.settings.options();
-    let answer = match question {
+    Ok(match question {
         Question::Residual => {
-            logs.extend(held_out);
-            refine::residual(&made.model, &logs, &options, watch)
-                .map(|residual| Answer::Residual(Box::new(residual)))
+            let logs = [logs(false), logs(true)].concat();
+            Answer::Residual(Box::new(refine::residual(&made.model, &logs, &options, watch).map_err(said)?))
         }
-        Question::Refine => refine::refine(&made.model, &logs, &held_out, &options, watch)
-            .map(|refined| Answer::Refined(Box::new(refined))),
-    };
-    match answer {
-        Ok(answer) => End::Answered(answer),
-        Err(RefineError::Cancelled) => End::Cancelled,
-        Err(problem) => End::Refused(problem.to_string()),
-    }
+        Question::Refine => {
+            let found = refine::refine(&made.model, &logs(false), &logs(true), &options, watch);
+            Answer::Refined(Box::new(found.map_err(said)?))
+        }
+        Question::Demo => {
+            let shown = refine::demonstrate(made.settings.seed, watch);
+            Answer::Shown(Box::new(shown.map_err(|problem: DemonstrationError| problem.to_string())?))
+        }
+    })
+}
+
+/// Whether a model is the one that a demonstration takes.
+pub(super) fn is_of_demo(model: &Model) -> bool {
+    static PAPER: LazyLock<Model> = LazyLock::new(presets::paper);
+    *model == *PAPER
 }
 
 /// The answer as a sentence without its full stop.

@@ -21,6 +21,8 @@ pub(super) struct Source {
     pub(super) path: PathBuf,
     /// Takes no part in the estimates, and tells the error.
     pub(super) held_out: bool,
+    /// Whether it was made in this program, and no file has it.
+    made: bool,
     /// The column map that it was loaded with.
     map: Vec<Mapping>,
     pub(super) loader: Loader,
@@ -33,6 +35,16 @@ pub(super) struct Input {
     pub(super) held_out: bool,
     pub(super) map: Vec<Mapping>,
     pub(super) log: Arc<Log>,
+    /// Whether no file has it.
+    pub(super) made: bool,
+}
+
+impl Input {
+    /// A log that no file has.
+    pub(super) fn made(loaded: &LoadedLog) -> Self {
+        let (path, log) = (loaded.path.clone(), Arc::clone(&loaded.log));
+        Self { path, held_out: false, map: Vec::new(), log, made: true }
+    }
 }
 
 /// The very same log in the same part.
@@ -78,6 +90,7 @@ impl Sources {
                 id: self.next_id,
                 path: path.to_owned(),
                 held_out,
+                made: false,
                 map: Vec::new(),
                 loader: Loader::default(),
             });
@@ -88,6 +101,17 @@ impl Sources {
         source.loader.start(path, map, waker)?;
         self.path.clear();
         Ok(())
+    }
+
+    /// These logs, which no file has, in place of all others.
+    pub(super) fn replace(&mut self, logs: Vec<LoadedLog>) {
+        self.list.clear();
+        for loaded in logs {
+            self.next_id += 1;
+            let (id, path) = (self.next_id, loaded.path.clone());
+            let loader = Loader::holding(loaded);
+            self.list.push(Source { id, path, held_out: false, made: true, map: Vec::new(), loader });
+        }
     }
 
     pub(super) fn remove(&mut self, id: u64) {
@@ -121,6 +145,7 @@ impl Sources {
             held_out: source.held_out,
             map: source.map.clone(),
             log: Arc::clone(&loaded.log),
+            made: source.made,
         };
         let mut inputs: Vec<Input> = self.loaded().map(input).collect();
         inputs.sort_by_key(|input| input.held_out);
@@ -220,8 +245,9 @@ impl Source {
                 if remove.accessible_name(format!("{word} {name}")).clicked() {
                     send(RefineCommand::Remove(self.id));
                 }
-                let again =
-                    ui.small_button("Reload").on_hover_text("Read it again, with the column map above");
+                let help = "Read it again, with the column map above";
+                let again = ui.add_enabled(!self.made, egui::Button::new("Reload").small());
+                let again = again.on_hover_text(help).on_disabled_hover_text("No file has it");
                 if again.accessible_name(format!("Reload {name}")).clicked() {
                     send(RefineCommand::Load { path: self.path.clone(), held_out: self.held_out });
                 }

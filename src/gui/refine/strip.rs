@@ -1,7 +1,9 @@
 //! Where in the loop one is: health ▸ residual ▸ candidates ▸ add ▸ before and after.
 
-use egui::text::LayoutJob;
-use egui::{Align, Button, Color32, FontSelection, Layout, RichText, Ui, Vec2, vec2};
+use egui::{
+    Color32, Rect, RichText, Role, Sense, StrokeKind, TextStyle, TextWrapMode, Ui, Vec2, WidgetInfo,
+    WidgetText, pos2, vec2,
+};
 
 use crate::theme::palette;
 
@@ -97,7 +99,7 @@ impl StepState {
 
 /// Width of the arrow between two steps.
 const ARROW: f32 = 14.0;
-const HEIGHT: f32 = 38.0;
+const HEIGHT: f32 = 40.0;
 
 /// Draws the steps; a click shows one.
 pub(super) fn ui(shown: &mut Step, states: &[StepState; 5], ui: &mut Ui) {
@@ -117,21 +119,31 @@ pub(super) fn ui(shown: &mut Step, states: &[StepState; 5], ui: &mut Ui) {
 }
 
 fn step_ui(shown: &mut Step, step: Step, state: &StepState, ui: &mut Ui, size: Vec2) {
-    let mut text = LayoutJob::default();
-    let (style, font) = (ui.style().clone(), FontSelection::Default);
-    let title = RichText::new(format!("{}  {}\n", step as usize + 1, step.title())).strong();
-    title.append_to(&mut text, &style, font.clone(), Align::Center);
-    RichText::new(&state.text).small().color(state.color(ui)).append_to(
-        &mut text,
-        &style,
-        font,
-        Align::Center,
-    );
-    let layout = Layout::centered_and_justified(egui::Direction::LeftToRight);
-    let button = Button::selectable(*shown == step, text).wrap_mode(egui::TextWrapMode::Truncate);
-    let button = ui.allocate_ui_with_layout(size, layout, |ui| ui.add_sized(size, button)).inner;
-    let button = button.on_hover_text(format!("{}\n{}", step.help(), state.text));
-    if button.accessible_name(format!("step {}: {}", step.key(), state.text)).clicked() {
+    let (rect, step_button) = ui.allocate_exact_size(size, Sense::click());
+    let selected = *shown == step;
+    let name = format!("step {}: {}", step.key(), state.text);
+    step_button.widget_info(|| WidgetInfo::selected(Role::Button, true, selected, &name));
+    if ui.is_rect_visible(rect) {
+        let visuals = ui.style().interact_selectable(&step_button, selected);
+        if selected || step_button.hovered() || step_button.has_focus() {
+            ui.painter().rect(rect, 4.0, visuals.weak_bg_fill, visuals.bg_stroke, StrokeKind::Inside);
+        }
+        let title = RichText::new(format!("{}  {}", step as usize + 1, step.title())).strong();
+        let color = if selected { visuals.text_color() } else { state.color(ui) };
+        line_ui(title.color(visuals.text_color()), rect, 0.3, ui);
+        line_ui(RichText::new(&state.text).small().color(color), rect, 0.72, ui);
+    }
+    if step_button.on_hover_text(format!("{}\n{}", step.help(), state.text)).clicked() {
         *shown = step;
     }
+}
+
+/// One line of a step, centred, at a share of its height, cut short where it is too long.
+fn line_ui(text: RichText, rect: Rect, height: f32, ui: &Ui) {
+    let width = (rect.width() - 8.0).max(1.0);
+    let text: WidgetText = text.into();
+    let galley = text.into_galley(ui, Some(TextWrapMode::Truncate), width, TextStyle::Body);
+    let middle = pos2(rect.center().x, rect.top() + height * rect.height());
+    let corner = middle - 0.5 * galley.size();
+    ui.painter().galley(corner, galley, ui.visuals().text_color());
 }

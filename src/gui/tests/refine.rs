@@ -103,6 +103,118 @@ fn a_file_that_is_not_there_is_said_in_its_place() {
     window.get_by_label("Needs a log that is not held out.");
 }
 
+/// Shows a step of the loop.
+fn show(window: &mut Window, step: &str) {
+    window.get_by_label_contains(&format!("step {step}:")).click();
+    window.run_steps(3);
+    assert_eq!(state(window)["refine_tab"]["step"], step);
+}
+
+#[test]
+fn an_effect_that_is_not_ticked_stays_out_of_what_is_saved_and_used() {
+    let (log, held_out) = (
+        TempFile::new("ticks.csv", &log_csv(COGGING, 4)),
+        TempFile::new("ticks-held-out.csv", &log_csv(COGGING, 5)),
+    );
+    let mut window = page();
+    add(&mut window, &log);
+    add(&mut window, &held_out);
+    let name = held_out.0.file_name().unwrap().to_str().unwrap().to_owned();
+    click(&mut window, &format!("{name} held out"));
+    let found = search(&mut window);
+    let command = found["refine_tab"]["command"].as_str().unwrap();
+    assert!(command.contains(&format!(" --heldout {}", held_out.name())), "{command}");
+
+    let model = TempFile::new("ticked.toml", "");
+    std::fs::remove_file(&model.0).unwrap();
+    let saved = |window: &mut Window| {
+        enter(window, "path to save what was found to", model.name());
+        until(window, "saving", |s| s["message"].as_str().is_some_and(|m| m.contains("ticked.toml")));
+        std::fs::read_to_string(&model.0).unwrap()
+    };
+    assert!(saved(&mut window).contains("cogging"));
+
+    // What is there is replaced only after a question.
+    click(&mut window, "add cogging");
+    assert!(saved(&mut window).contains("cogging"));
+    click(&mut window, "Replace");
+    until(&mut window, "saving", |s| s["message"].as_str().is_some_and(|m| m.starts_with("Saved")));
+    let text = std::fs::read_to_string(&model.0).unwrap();
+    assert!(!text.contains("cogging"), "{text}");
+    Model::from_toml(&text, "saved").unwrap();
+}
+
+#[test]
+fn what_is_stale_says_so_in_the_page_and_in_the_file() {
+    let log = TempFile::new("stale.csv", &log_csv(COGGING, 6));
+    let report = TempFile::new("stale.html", "");
+    std::fs::remove_file(&report.0).unwrap();
+    let mut window = page();
+    add(&mut window, &log);
+    search(&mut window);
+    enter(&mut window, "seed of the search", "7");
+    assert_eq!(state(&window)["refine_tab"]["standing"], "stale");
+    window.get_by_label_contains("Stale. This was made with other settings");
+    enter(&mut window, "path to save what was found to", report.name());
+    let saved = until(&mut window, "saving", |s| s["message"].as_str().is_some_and(|m| m.contains(".html")));
+    assert!(saved["message"].as_str().unwrap().contains("Stale when it was saved"), "{saved:#}");
+    let html = std::fs::read_to_string(&report.0).unwrap();
+    assert!(html.contains("Stale when it was saved") && html.contains("<svg"));
+    enter(&mut window, "seed of the search", "1");
+    assert_eq!(state(&window)["refine_tab"]["standing"], "fresh");
+}
+
+#[test]
+fn a_log_that_cannot_answer_gives_reasons_and_no_effect() {
+    let text = log_csv(COGGING, 7);
+    let mut lines = text.lines();
+    let head = lines.next().unwrap();
+    let torque = head.split(',').position(|name| name == "torque_nm").unwrap();
+    let dead = lines.map(|line| {
+        let mut cells: Vec<&str> = line.split(',').collect();
+        cells[torque] = "0.1";
+        cells.join(",")
+    });
+    let log = TempFile::new("dead.csv", &format!("{head}\n{}\n", dead.collect::<Vec<_>>().join("\n")));
+    let mut window = page();
+    add(&mut window, &log);
+    let found = search(&mut window);
+    let tab = &found["refine_tab"];
+    assert_eq!(tab["refinement"]["verdict"], "data_unfit", "{tab:#}");
+    assert_eq!(tab["refinement"]["effects"].as_array().map(Vec::len), Some(0));
+    assert_eq!(tab["step"], "health");
+    assert!(window.query_all_by_label("error").next().is_some());
+    show(&mut window, "add");
+    window.get_by_label_contains("Data unfit");
+    assert!(window.query_by_label("Use in the model").is_none());
+}
+
+#[test]
+fn every_step_shows_what_there_is() {
+    let log = TempFile::new("steps.csv", &log_csv(COGGING, 8));
+    let mut window = page();
+    for step in ["residual", "candidates", "add", "compare"] {
+        show(&mut window, step);
+        window.get_by_label("Nothing was searched yet.");
+    }
+    add(&mut window, &log);
+    click(&mut window, "How far is the model?");
+    let answered = until(&mut window, "the residual", |s| s["refine_tab"]["residual"].is_object());
+    assert_eq!(answered["refine_tab"]["step"], "residual");
+    window.get_by_label("How far the model is");
+    search(&mut window);
+    for (step, text) in [
+        ("residual", "means from peak to peak"),
+        ("residual", "strongest: order"),
+        ("candidates", "What was tried"),
+        ("add", "add it"),
+        ("compare", "On rows that took no part in the estimates"),
+    ] {
+        show(&mut window, step);
+        assert!(window.query_all_by_label_contains(text).next().is_some(), "{step}: {text}");
+    }
+}
+
 #[test]
 fn the_page_survives_any_size_and_any_input() {
     let log = TempFile::new("sizes.csv", &log_csv(COGGING, 3));
