@@ -379,15 +379,15 @@ impl RefineTab {
         if let Some(truth) = &self.run.truth {
             effects::truth_ui(truth, ui);
         }
+        if !found.effects.is_empty() {
+            use_ui(context, standing, self.ticks.contains(&true), ui);
+        }
         let before = self.ticks.clone();
         for (effect, tick) in found.effects.iter().zip(&mut self.ticks) {
             effects::effect_ui(effect, tick, ui);
         }
         if self.ticks != before {
             self.chosen = Some(refined.made.refined_with(found, &self.ticks));
-        }
-        if !found.effects.is_empty() {
-            use_ui(context, standing, self.ticks.contains(&true), ui);
         }
         let look = effects::unexplained_ui(&found.unexplained, ui);
         if let Some(next) = &found.next_experiment {
