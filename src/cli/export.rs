@@ -4,10 +4,11 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use flqr_core::control::{BalanceController, ControllerKind, GainSchedule};
+use flqr_core::effects::Effect;
 use flqr_core::export::{Controller, Format};
 use serde::Serialize;
 
-use super::output::{Failure, Output};
+use super::output::{Failure, Output, complain};
 use super::{gains, input};
 
 /// Heights of the legs in the exported table.
@@ -59,6 +60,13 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         Form::Csv => Format::Csv,
     };
     let text = controller.render(format);
+    if format == Format::CHeader && !controller.effects.is_empty() {
+        let ids: Vec<&str> = controller.effects.iter().map(Effect::id).collect();
+        complain(&format!(
+            "the header leaves out what the model feeds forward beside friction: {}; json, yaml and csv have it",
+            ids.join(", ")
+        ));
+    }
     output.result(&Exported { controller: &controller, text: text.clone() }, |out| {
         out.write_all(text.as_bytes())
     })

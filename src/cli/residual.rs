@@ -119,7 +119,8 @@ fn print_predictions(out: &mut dyn Write, errors: &[(&str, &Errors)]) -> io::Res
             let own = errors.prediction.get(index);
             write!(out, "{:>14}", own.map_or(String::new(), |own| number(own.rmse.value)))?;
         }
-        let (noise, motion) = (number(prediction.noise_floor.value), number(prediction.motion.value));
+        let last = errors.last().and_then(|(_, last)| last.prediction.get(index)).unwrap_or(prediction);
+        let (noise, motion) = (number(last.noise_floor.value), number(last.motion.value));
         writeln!(out, " {} (noise {noise}, motion {motion})", prediction.rmse.unit)?;
     }
     Ok(())

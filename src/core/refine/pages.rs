@@ -177,7 +177,7 @@ fn number(value: f64) -> Cell {
     if !value.is_finite() {
         return Cell::Empty;
     }
-    let digits = if value == 0.0 { 0 } else { 4 - value.abs().log10().floor() as i32 };
+    let digits = if value.fract() == 0.0 { 0 } else { 4 - value.abs().log10().floor() as i32 };
     Cell::Number(format!("{value:.*}", digits.clamp(0, 9) as usize))
 }
 

@@ -41,7 +41,7 @@ fn noise(explorer: &Explorer) -> Vec<Limit> {
 }
 
 fn residual_axis(explorer: &Explorer) -> Axis {
-    Axis::new(format!("Residual of {}", explorer.channel), explorer.unit)
+    Axis::new(sentence(&format!("{} residual", explorer.channel)), explorer.unit)
 }
 
 fn held(explorer: &Explorer, values: &[f64]) -> Vec<f64> {

@@ -499,9 +499,13 @@ impl Start {
         truth
             .zip(free.iter().zip(&disturbed))
             .map(|(truth, (free, disturbed))| {
+                // Where noise at the start may have thrown the robot over, it may be the cause of all of the error.
+                let thrown = matches!(moving, Moving::Robot { .. })
+                    && (free[0].abs() >= FALL_PITCH_RAD || disturbed[0].abs() >= FALL_PITCH_RAD);
                 let of = |n: usize| {
+                    let error = free[n] - truth[n];
                     let noise = (disturbed[n] - free[n]).hypot(reading[n]);
-                    [free[n] - truth[n], truth[n] - start[n], noise]
+                    [error, truth[n] - start[n], if thrown { noise.max(error.abs()) } else { noise }]
                 };
                 (0..truth.len()).map(of).collect()
             })

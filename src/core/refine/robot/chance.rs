@@ -85,6 +85,8 @@ struct Twin<'a> {
 impl<'a> Twin<'a> {
     fn new(trace: &'a Trace, known: &'a Tolerances, corrections: &[(&Nuisance, f64)]) -> Option<Self> {
         let mut robot = trace.robot.clone();
+        // Its simulated IMU speaks at once.
+        robot.sensors.imu_latency_s = 0.0;
         let value = |key: &str, declared: f64| {
             corrections.iter().find(|(n, _)| n.key == key).map_or(declared, |(n, off)| n.declared + off)
         };
