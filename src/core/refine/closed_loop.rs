@@ -242,22 +242,14 @@ fn offered(refined: &mut Model, kinds: &[&'static EffectKind], seed: u64) -> Opt
     let Rig::Robot(robot) = &refined.rig else { return None };
     let able: Vec<usize> =
         (0..robot.effects.len()).filter(|&place| robot.effects[place].is_fed_forward()).collect();
-    let mut verdicts: Vec<Result<String, String>> = Vec::new();
-    let together = trial(refined, &able, &able, seed);
+    // One after the other, each beside those that have passed, so that none hides behind another.
+    let (mut verdicts, mut passed) = (Vec::new(), Vec::new());
     for &place in &able {
-        verdicts.push(match &together {
-            Ok(reason) => Ok(reason.clone()),
-            Err(_) => trial(refined, &able, &[place], seed),
-        });
-    }
-    // What passes alone must also pass with the others.
-    let passed: Vec<usize> =
-        able.iter().zip(&verdicts).filter(|(_, verdict)| verdict.is_ok()).map(|(place, _)| *place).collect();
-    if together.is_err()
-        && passed.len() > 1
-        && let Err(reason) = trial(refined, &able, &passed, seed)
-    {
-        verdicts.iter_mut().for_each(|verdict| *verdict = Err(reason.clone()));
+        let verdict = trial(refined, &able, &passed, place, seed);
+        if verdict.is_ok() {
+            passed.push(place);
+        }
+        verdicts.push(verdict);
     }
     let mut told = Vec::new();
     for &kind in kinds {
@@ -292,14 +284,23 @@ fn keep_from(model: &mut Model, places: &[usize]) {
     }
 }
 
-/// Whether the loop stays as calm with the feedforward of some of the effects as without any, and how calm it is.
-fn trial(refined: &Model, able: &[usize], fed: &[usize], seed: u64) -> Result<String, String> {
-    let mut none = refined.clone();
-    keep_from(&mut none, able);
-    let mut some = refined.clone();
-    let others: Vec<usize> = able.iter().copied().filter(|place| !fed.contains(place)).collect();
-    keep_from(&mut some, &others);
-    let plants = variations(refined, fed);
+/// Whether the loop stays as calm where one more of the effects is fed forward beside some, and how calm it is.
+fn trial(
+    refined: &Model,
+    able: &[usize],
+    beside: &[usize],
+    added: usize,
+    seed: u64,
+) -> Result<String, String> {
+    let feeding = |fed: &dyn Fn(usize) -> bool| {
+        let mut model = refined.clone();
+        let others: Vec<usize> = able.iter().copied().filter(|&place| !fed(place)).collect();
+        keep_from(&mut model, &others);
+        model
+    };
+    let none = feeding(&|place| beside.contains(&place));
+    let some = feeding(&|place| place == added || beside.contains(&place));
+    let plants = variations(refined, added);
     let jobs: Vec<(usize, &Model)> = (0..plants.len()).flat_map(|n| [(n, &none), (n, &some)]).collect();
     let runs = parallel::map(&jobs, threads(), |(n, controller)| {
         ground_run(Scenario::Station, controller, &plants[*n].1, CHECK_SECONDS, seed + *n as u64)
@@ -342,7 +343,7 @@ fn trial(refined: &Model, able: &[usize], fed: &[usize], seed: u64) -> Result<St
 }
 
 /// Plants that a feedforward has to serve.
-fn variations(refined: &Model, fed: &[usize]) -> Vec<(&'static str, Model)> {
+fn variations(refined: &Model, fed: usize) -> Vec<(&'static str, Model)> {
     let changed = |change: &dyn Fn(&mut RobotModel)| {
         let mut model = refined.clone();
         if let Rig::Robot(robot) = &mut model.rig {
@@ -356,10 +357,8 @@ fn variations(refined: &Model, fed: &[usize]) -> Vec<(&'static str, Model)> {
     });
     let later = changed(&|robot| robot.actuation.delay_s += LATER_S);
     let smaller = changed(&|robot| {
-        for &place in fed {
-            if let Some(effect) = scaled(&robot.effects[place], SMALLER) {
-                robot.effects[place] = effect;
-            }
+        if let Some(effect) = scaled(&robot.effects[fed], SMALLER) {
+            robot.effects[fed] = effect;
         }
     });
     vec![
@@ -371,7 +370,7 @@ fn variations(refined: &Model, fed: &[usize]) -> Vec<(&'static str, Model)> {
 }
 
 /// The same effect of another size.
-pub(super) fn scaled(effect: &Effect, share: f64) -> Option<Effect> {
+fn scaled(effect: &Effect, share: f64) -> Option<Effect> {
     let own = effect.kind().parameters;
     let sized = effect.parameters().iter().enumerate().map(|(n, (key, value))| {
         let amplitude = own[n % own.len()].role == Role::Amplitude;
