@@ -14,6 +14,8 @@ const RIGHT_UNIT: [f64; 2] = [0.5, 2.0];
 const COHERENT: f64 = 0.6;
 /// The same where the column of the speed is off by that factor too.
 const COHERENT_WITH_GEAR: f64 = 0.3;
+/// Degrees in a radian, 1/s of a rev/min, and powers of ten: factors of a unit and of no gear.
+const UNITS: [f64; 5] = [57.296, 9.549, 10.0, 100.0, 1000.0];
 /// Share of rows at a limit above which an effort is cut off.
 const CUT_OFF: f64 = 0.2;
 /// Runs of equal values that are usual, from which on a column is held.
@@ -147,6 +149,26 @@ pub(super) fn check_rows(
     found
 }
 
+/// The finding that the column of the speed is that of a motor before a gear, and so is the effort beside it.
+fn before_a_gear(rows: &Rows, declared: &Declared) -> Option<HealthFinding> {
+    let ratio = rows.agreement.filter(|speed| speed.incoherent < 0.5)?.factor;
+    let is_unit = |unit: &f64| (ratio.abs().ln().abs() - unit.ln()).abs() < 0.03;
+    if (RIGHT_UNIT[0]..=RIGHT_UNIT[1]).contains(&ratio) || UNITS.iter().any(is_unit) {
+        return None;
+    }
+    let names = declared.names();
+    let problem = format!(
+        "`{}` changes {ratio:.3} times as fast as `{}` says: a gear lies between, and the effort of the motor before it \
+         cannot be the one that acts on the axis",
+        names.position, names.speed
+    );
+    let mend = format!(
+        "read both with the gear's ratio: --map {0}={0}*{ratio:.3} and the same of the speed",
+        names.effort
+    );
+    Some(finding(Severity::Error, names.effort, problem, mend))
+}
+
 /// Whether the measured effort can be what the declared model says it is.
 pub(super) fn check_effort(
     rows: &Rows,
@@ -189,7 +211,7 @@ pub(super) fn check_effort(
         .filter(|speed| !(RIGHT_UNIT[0]..=RIGHT_UNIT[1]).contains(speed));
     let needed = if gear.is_some() { COHERENT_WITH_GEAR } else { COHERENT };
     if explained < needed * (explained + left) || explained < needed * 0.5 * blocks.target_power() {
-        return Vec::new();
+        return before_a_gear(rows, declared).into_iter().collect();
     }
     if factor < 0.0 {
         let problem = "the effort acts against what the declared model wants: its sign is turned".to_owned();

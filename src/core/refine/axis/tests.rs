@@ -24,6 +24,17 @@ fn ids(found: &Refinement) -> Vec<&str> {
 const SHAFT: &str = "name = \"shaft\"\n[axis]\nkind = \"rotary\"\ninertia_kg_m2 = 0.005\n[friction]\n\
                      coulomb_nm = 0.03\nviscous_nm_s_rad = 0.0005\n";
 
+/// The same as a carriage, with the same numbers.
+const RAIL: &str = "name = \"rail\"\n[axis]\nkind = \"linear\"\nmass_kg = 0.005\n[friction]\n\
+                    coulomb_n = 0.03\nviscous_n_s_m = 0.0005\n";
+const RAIL_NAMES: [(&str, &str); 3] =
+    [("time_s", "time_s"), ("motor_angle_rad", "position_m"), ("torque_nm", "force_n")];
+
+fn on_rail(log: &Log) -> Log {
+    let column = |(old, new): &(&'static str, &'static str)| (*new, log.column(old).unwrap().to_vec());
+    Log::from_columns(log.source.clone(), RAIL_NAMES.iter().map(column))
+}
+
 /// A shaft that turns back and forth without ever resting long, driven by the torque that its motion takes, with what
 /// `more` adds to it; noise of an encoder of 16 bits and of the torque.
 fn shaft(seed: u64, more: impl Fn(f64, f64, f64) -> f64) -> Log {
@@ -152,14 +163,19 @@ fn logs_that_cannot_answer_are_told_before_any_effect() {
             "",
         ),
     ] {
-        let found = refined(SHAFT, &[bad], &[], &[]);
-        assert_eq!((found.verdict, ids(&found)), (Verdict::DataUnfit, vec![]), "{what}");
-        let mut errors = found.data_health.iter().filter(|finding| finding.severity == Severity::Error);
-        assert!(
-            errors.any(|finding| finding.column == column && finding.problem.contains(told)),
-            "{what}: {:#?}",
-            found.data_health
-        );
+        for (model, bad, column) in [
+            (SHAFT, bad.clone(), column),
+            (RAIL, on_rail(&bad), RAIL_NAMES.iter().find(|(name, _)| *name == column).unwrap().1),
+        ] {
+            let found = refined(model, &[bad], &[], &[]);
+            assert_eq!((found.verdict, ids(&found)), (Verdict::DataUnfit, vec![]), "{what}");
+            let mut errors = found.data_health.iter().filter(|finding| finding.severity == Severity::Error);
+            assert!(
+                errors.any(|finding| finding.column == column && finding.problem.contains(told)),
+                "{what}: {:#?}",
+                found.data_health
+            );
+        }
     }
 }
 
@@ -207,14 +223,20 @@ const SMALL: &str = "name = \"small\"\n[axis]\nkind = \"rotary\"\ninertia_kg_m2 
                      coulomb_nm = 0.08\nviscous_nm_s_rad = 0.0002\n";
 const FREE: [&str; 4] = ["inertia_kg_m2", "viscous_nm_s_rad", "coulomb_nm", "offset_nm"];
 
+/// Whatever the model file says of the inertia, which nobody measured.
 #[test]
 fn cogging_of_a_measured_motor_is_found_at_its_order() {
     let Some(log) = shared("laas_bldc/speed_test1.csv", &LAAS) else { return };
-    let found = refined(SMALL, &[log], &[], &FREE);
-    assert_eq!(ids(&found)[0], "cogging");
-    assert_eq!(found.effects[0].effect.get("order_1"), Some(72.0));
-    let drop = 1.0 - found.after.rmse.main() / found.before.rmse.main();
-    assert!(drop > 0.55, "{drop}");
+    for inertia in ["0.0002", "4e-6", "0.01"] {
+        let found = refined(&SMALL.replacen("0.0002", inertia, 1), std::slice::from_ref(&log), &[], &FREE);
+        assert_eq!(ids(&found)[0], "cogging");
+        assert_eq!(found.effects[0].effect.get("order_1"), Some(72.0));
+        let drop = 1.0 - found.after.rmse.main() / found.before.rmse.main();
+        assert!(drop > 0.55, "{inertia}: {drop}");
+        // In one direction alone they are the same.
+        let twin = &found.effects[0].ambiguous_with;
+        assert!(twin.iter().any(|kind| kind.id == "position_dependent_friction"), "{twin:?}");
+    }
 }
 
 #[test]
@@ -236,6 +258,25 @@ fn the_published_positioning_axis_lacks_effects() {
     assert!((0.038..0.047).contains(&before), "{before}");
     assert!(after <= 0.026, "{after}: {:?}", ids(&found));
     assert_eq!(ids(&found)[0], "viscous_asymmetry");
+}
+
+/// Without a weight the torque says little of its unit, and the speed says that a gear is between.
+#[test]
+fn a_gear_is_told_of_an_arm_without_a_weight_too() {
+    let map = ["motor_angle_rad=angle_rad", "motor_speed_rad_s=speed_rad_s"];
+    let model = "name = \"pendulum\"\n[axis]\nkind = \"rotary\"\ninertia_kg_m2 = 0.01158\ngravity_torque_nm = 0.05739\n\
+                 [friction]\ncoulomb_nm = 0.09\nviscous_nm_s_rad = 0.047\n";
+    let Some(log) = shared("go1_pendulum/go1_m0kg_sin_sin.csv", &map) else { return };
+    for estimate in [&[][..], &["all"]] {
+        let found = refined(model, std::slice::from_ref(&log), &[], estimate);
+        assert_eq!((found.verdict, ids(&found)), (Verdict::DataUnfit, vec![]));
+        let told = found.data_health.iter().any(|finding| {
+            finding.severity == Severity::Error
+                && finding.column == "torque_nm"
+                && finding.problem.contains("gear")
+        });
+        assert!(told, "{:#?}", found.data_health);
+    }
 }
 
 #[test]
