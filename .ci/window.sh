@@ -88,7 +88,7 @@ started+=($!)
 sleep 0.5
 
 rm -f "$state"
-LIBGL_ALWAYS_SOFTWARE=1 XDG_CONFIG_HOME="$scratch" "$binary" --state-out "$state" 2>"$scratch/stderr" &
+LIBGL_ALWAYS_SOFTWARE=1 XDG_CONFIG_HOME="$scratch" XDG_STATE_HOME="$scratch" "$binary" --state-out "$state" 2>"$scratch/stderr" &
 program=$!
 started+=("$program")
 window=$(timeout 60 xdotool search --sync --onlyvisible --name '^flqr' | tail -1) || fail "no window appeared"
@@ -162,11 +162,50 @@ picture tune-light
 differ tune tune-light
 kill -0 "$program" 2>/dev/null || fail "the program ended by itself"
 
-echo "watching an emulated robot"
-kill "$program"
+echo "any command by its name, and pages beside each other"
+xdotool key ctrl+k
+sleep 0.5
+xdotool type --delay 30 "friction to the right"
+picture palette
+xdotool key Return
+until_state 10 "friction is beside tune" '.shown == ["tune", "friction"]'
+picture beside
+differ tune-light beside
+
+# start NAME: opens the window again; its title is flqr.
+start() {
+    rm -f "$state"
+    LIBGL_ALWAYS_SOFTWARE=1 XDG_CONFIG_HOME="$scratch" XDG_STATE_HOME="$scratch" "$binary" --state-out "$state" \
+        2>"$scratch/stderr" &
+    program=$!
+    started+=("$program")
+    window=$(timeout 60 xdotool search --sync --onlyvisible --name '^flqr' | tail -1) || fail "no window: $1"
+    xdotool windowactivate --sync "$window" windowmove "$window" 0 0 windowsize "$window" 1278 776
+}
+
+echo "coming back after a kill"
+sleep 2
+kill -9 "$program"
 wait "$program" 2>/dev/null || true
+start "after a kill"
+until_state 30 "the session of before is offered" '.question == "restore"'
+picture restore
+xdotool key Tab space
+until_state 10 "the weight is back, beside the fit" '.q_diagonal[0] == 450 and .shown == ["tune", "friction"]'
+xdotool key ctrl+q
+until_state 10 "closing asks" '.question == "leave"'
+picture leave
+xdotool key Tab Tab space
+for ((i = 0; i < 100; i++)); do
+    kill -0 "$program" 2>/dev/null || break
+    sleep 0.1
+done
+kill -0 "$program" 2>/dev/null && fail "the window did not close"
+wait "$program" || fail "the closed window ended with code $?"
+
+echo "watching an emulated robot"
 rm -f "$state"
-LIBGL_ALWAYS_SOFTWARE=1 XDG_CONFIG_HOME="$scratch" "$binary" --tab robot --source emulated --state-out "$state" \
+LIBGL_ALWAYS_SOFTWARE=1 XDG_CONFIG_HOME="$scratch" XDG_STATE_HOME="$scratch" "$binary" --tab robot --source emulated --state-out "$state" \
     2>"$scratch/stderr" &
 program=$!
 started+=("$program")

@@ -118,3 +118,91 @@ pub(crate) fn run(cli: Cli) -> ExitCode {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use flqr_core::control::drive::Excitation;
+    use flqr_core::control::{BalanceController, ControllerKind};
+    use flqr_core::device::{SessionMode, SessionOptions, Source};
+    use flqr_core::identify::{Bounds, FitOptions, Method, Motor};
+    use flqr_core::model_file::presets;
+    use flqr_gui::command_line;
+    use nalgebra::Matrix2x4;
+
+    use super::*;
+
+    /// The words of a line as a shell takes them: single quotes, and a quote behind a backslash.
+    fn words(line: &str) -> Vec<String> {
+        let (mut words, mut word, mut quoted) = (Vec::new(), String::new(), false);
+        let mut letters = line.chars();
+        while let Some(letter) = letters.next() {
+            match letter {
+                '\'' => quoted = !quoted,
+                '\\' if !quoted => word.extend(letters.next()),
+                ' ' if !quoted => words.push(std::mem::take(&mut word)),
+                _ => word.push(letter),
+            }
+        }
+        words.push(word);
+        words
+    }
+
+    fn session(source: &str, mode: SessionMode) -> SessionOptions {
+        SessionOptions {
+            source: source.parse().unwrap(),
+            imu: Some("serial:/dev/ttyUSB0@115200".parse().unwrap()),
+            dbc: None,
+            robot: presets::paper().robot().unwrap().clone(),
+            mode,
+            record: None,
+            seed: 1,
+            replay_speed: 2.5,
+        }
+    }
+
+    fn drive(excitation: Excitation) -> SessionMode {
+        let paper = presets::paper();
+        let controller =
+            BalanceController::new(ControllerKind::Lqr, paper.robot().unwrap(), Matrix2x4::zeros()).unwrap();
+        SessionMode::Drive { controller: Box::new(controller), excitation }
+    }
+
+    #[test]
+    fn what_the_window_copies_is_a_command() {
+        let path = Some(Path::new("it's my robot.toml"));
+        let map = ["torque_nm=Motor current*0.32".parse().unwrap(), "time_s=t".parse().unwrap()];
+        let log = Path::new("a log.csv");
+        let every = FitOptions {
+            method: Method::Pso,
+            bounds: Bounds::Paper,
+            estimate: vec!["all".to_owned()],
+            seed: 3,
+        };
+        let mut lines = vec![
+            command_line::gains(path),
+            command_line::gains(None),
+            command_line::fit(log, &map, Motor::Right, &every, Some(path)),
+            command_line::fit(log, &[], Motor::Left, &FitOptions::default(), None),
+        ];
+        for source in ["can:can0", "slcan:/dev/ttyACM0@1000000", "emulated", "replay:a recording.csv"] {
+            let options = session(source, SessionMode::Listen);
+            lines.push(command_line::robot(&options, &[], ControllerKind::Flqr, path));
+        }
+        for excitation in [
+            Excitation::Balance,
+            Excitation::BalanceMultisine,
+            Excitation::SpeedSweep { seconds: 30.5 },
+            Excitation::Multisine { seconds: 60.0 },
+        ] {
+            let options = session("can:can0", drive(excitation));
+            lines.push(command_line::robot(&options, &[], ControllerKind::Lqr, None));
+        }
+        for line in lines {
+            let read = Cli::try_parse_from(words(&line));
+            assert!(read.is_ok(), "{line}: {}", read.err().unwrap());
+        }
+        assert_eq!("can:can0".parse::<Source>().unwrap().to_string(), "can:can0");
+    }
+}

@@ -34,6 +34,9 @@ pub(crate) struct Arguments {
     /// Start with the simulated robot paused
     #[arg(long)]
     paused: bool,
+    /// Session file to open: model, weights, layout and sources as they were
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["model", "log"])]
+    session: Option<PathBuf>,
     /// Keep what the window shows in this file, as JSON, for scripts that drive the window
     #[arg(long, value_name = "FILE")]
     state_out: Option<PathBuf>,
@@ -50,6 +53,7 @@ enum TabName {
 }
 
 pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
+    let tour = arguments == Arguments::default();
     let model = match &arguments.model {
         Some(path) => input::load_model(path)?,
         None => presets::paper(),
@@ -71,6 +75,9 @@ pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
         imu: arguments.imu,
         paused: arguments.paused,
         state_out: arguments.state_out,
+        session: arguments.session,
+        state_folder: flqr_gui::default_state_folder(),
+        tour,
         ..WindowOptions::new(model)
     };
     flqr_gui::run(options).map_err(Failure::from_error)

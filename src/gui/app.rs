@@ -1,6 +1,8 @@
 //! The owner of everything: session, design, running robot, jobs. Views read it and send commands.
 
 mod apply;
+mod keep;
+mod questions;
 mod shell;
 
 use std::path::{Path, PathBuf};
@@ -19,6 +21,7 @@ use crate::commands::{Palette, Situation};
 use crate::context::ViewContext;
 use crate::design::Designer;
 use crate::dialog::{Answer, Dialog};
+use crate::document::{Base, Content, Opened, Store, Undo};
 use crate::experiments::ExperimentsTab;
 use crate::friction::FrictionTab;
 use crate::history::{Channel, History};
@@ -32,6 +35,7 @@ use crate::robot::{Link, RobotTab, sentence};
 use crate::session::Session;
 use crate::state_out::StateOut;
 use crate::tab::Tab;
+use crate::tour::Tour;
 use crate::tune::TuneTab;
 use crate::window::WindowOptions;
 
@@ -53,6 +57,21 @@ pub struct App {
     session: Session,
     /// The session as loaded or saved last, for the mark of unsaved changes and for Reset.
     saved: Session,
+    /// The number of the loaded model in the undo.
+    base: usize,
+    undo: Undo,
+    opening: Option<Job<(), Opened>>,
+    store: Option<Store>,
+    session_job: Option<keep::SessionJob>,
+    question: Option<questions::Question>,
+    /// The file dialog was asked for where no path field is in view.
+    asks_path: bool,
+    leave_after_save: bool,
+    leaving: bool,
+    /// Rows of the run ledger, as the session file has them.
+    runs: Option<serde_json::Value>,
+    tour: Option<Tour>,
+    tour_is_due: bool,
     model_path: Option<PathBuf>,
     /// The page that the user turned to last: what keys are about.
     tab: Tab,
@@ -79,6 +98,7 @@ pub struct App {
     model_job: Option<ModelJob>,
     state_out: Option<StateOut>,
     waker: Waker,
+    ctx: Context,
     frame_interval: Duration,
     frame_cpu_s: Option<f32>,
 }
@@ -97,13 +117,34 @@ impl App {
         let session = Session::new(options.model, ControllerKind::Flqr);
         let column_map = ColumnMapForm::new(&options.column_map);
         let state_out = options.state_out.map(StateOut::start).transpose()?;
+        let layout = Layout::new(options.tab);
+        let experiments = ExperimentsTab::default();
+        let base = Base { saved: session.clone(), path: options.model_path.clone() };
+        let content = Content {
+            session: session.clone(),
+            base: 0,
+            experiment: experiments.settings().clone(),
+            layout: layout.node(),
+        };
         let mut app = Self {
             saved: session.clone(),
+            base: 0,
+            undo: Undo::new(content, base),
+            opening: keep::open_store(options.state_folder, &waker)?,
+            store: None,
+            session_job: None,
+            question: None,
+            asks_path: false,
+            leave_after_save: false,
+            leaving: false,
+            runs: None,
+            tour: None,
+            tour_is_due: options.tour,
             tune: TuneTab::new(&session, options.model_path.as_deref()),
             session,
             model_path: options.model_path,
             tab: options.tab,
-            layout: Layout::new(options.tab),
+            layout,
             palette: None,
             source: Source::default(),
             paused_before: options.paused,
@@ -112,7 +153,7 @@ impl App {
             history: History::default(),
             friction: FrictionTab::new(column_map.clone()),
             refine: RefineTab::new(column_map),
-            experiments: ExperimentsTab::default(),
+            experiments,
             link: Link::new(options.devices),
             robot: RobotTab::default(),
             commands: Commands::default(),
@@ -124,6 +165,7 @@ impl App {
             model_job: None,
             state_out,
             waker,
+            ctx: ctx.clone(),
             frame_interval: Duration::from_millis(33),
             frame_cpu_s: None,
         };
@@ -136,6 +178,9 @@ impl App {
                 Tab::Refine => Command::Refine(RefineCommand::Load { path: log, held_out: false }),
                 _ => Command::LoadLog(log),
             });
+        }
+        if let Some(session) = options.session {
+            app.commands.send(Command::OpenSession(session));
         }
         if let Some(imu) = &options.imu {
             app.robot.form.fill_imu(imu);
@@ -164,6 +209,9 @@ impl App {
             self.apply(command, ctx);
         }
         self.follow_design();
+        self.watch_undo(ctx);
+        self.keep_session(ctx);
+        self.answer_close(ctx);
         self.write_state(ctx);
     }
 
@@ -193,6 +241,8 @@ impl App {
             is_hot: self.link.is_hot(),
             controller: self.session.controller,
             model_path: self.model_path.as_deref(),
+            can_undo: self.undo.peek(false).is_some(),
+            can_redo: self.undo.peek(true).is_some(),
             is_dark: ctx.global_style().visuals.dark_mode,
             zoom: ctx.zoom_factor(),
             is_usual_layout: self.layout.node().is_alike(&Node::default()),
@@ -309,6 +359,9 @@ impl App {
                         self.friction.suggest_column_map(&read.column_map);
                     }
                     self.robot.suggest(&read);
+                    if self.tour_is_due && !read.tour_done {
+                        self.tour = Some(Tour::default());
+                    }
                     self.recent = read;
                     self.recent_job = None;
                 }
@@ -338,6 +391,9 @@ impl App {
             Answer::Cancelled => {}
             Answer::Unavailable(problem) => {
                 self.fail(problem.clone());
+                if std::mem::take(&mut self.asks_path) {
+                    self.ask_path(purpose, Some(problem.clone()));
+                }
                 self.tune.note_dialog_problem(purpose, &problem);
                 self.friction.note_dialog_problem(purpose, &problem);
                 self.experiments.note_dialog_problem(purpose, &problem);
@@ -438,6 +494,11 @@ impl App {
             "unsaved_changes": self.session != self.saved,
             "tab": self.tab.key(),
             "shown": self.layout.shown().iter().map(|tab| tab.key()).collect::<Vec<_>>(),
+            "question": self.question.as_ref().map(questions::Question::key),
+            "undo": self.undo.undoable().collect::<Vec<_>>(),
+            "redo": self.undo.redoable().collect::<Vec<_>>(),
+            "tour": self.tour.map(Tour::number),
+            "leaving": self.leaving,
             "layout": self.layout.node().to_value(),
             "source": self.source.key(),
             "controller": controller,
@@ -472,6 +533,10 @@ fn read_recent(file: Option<PathBuf>, waker: &Waker) -> std::io::Result<Option<J
 }
 
 impl eframe::App for App {
+    fn on_exit(&mut self, _: Option<&eframe::glow::Context>) {
+        self.end();
+    }
+
     fn logic(&mut self, ctx: &Context, frame: &mut eframe::Frame) {
         self.frame_cpu_s = frame.info().cpu_usage;
         Self::logic(self, ctx);

@@ -84,6 +84,8 @@ pub(crate) enum FilePurpose {
     SaveExperiment(SavedAs),
     OpenReplay,
     SaveRecording,
+    OpenSession,
+    SaveSession,
     Refine(RefineFile),
     SaveFigure(FigureFile),
 }
@@ -131,7 +133,20 @@ pub(crate) enum Command {
     },
     SetFrameInterval(std::time::Duration),
     ShowDialog(FilePurpose),
+    /// A dialog, or a field for the path where the desktop has none.
+    AskFile(FilePurpose),
+    /// Loads a preset after a question that says what changes.
     LoadPreset(usize),
+    TakePreset(usize),
+    OpenSession(PathBuf),
+    /// Saves all of the window to a session file, whatever is there.
+    SaveSession(PathBuf),
+    Undo,
+    Redo,
+    ShowSteps,
+    StartTour,
+    /// Copies the command that does in a terminal what the page shows.
+    CopyCommand,
     LoadModel(PathBuf),
     /// Saves; a file other than the loaded one is replaced only after a question.
     SaveModel(PathBuf),

@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use crate::command::FilePurpose;
+use crate::document::EXTENSION;
 use crate::job::{Job, Waker};
 use crate::refine::RefineFile;
 
@@ -22,9 +23,11 @@ fn instead(purpose: FilePurpose) -> &'static str {
         FilePurpose::SaveRecording => "type a path above and press Record",
         FilePurpose::SaveFigure(_) => "type a path above and press Save figure",
         FilePurpose::OpenReplay => "type the path above",
-        FilePurpose::OpenModel | FilePurpose::OpenLog | FilePurpose::Refine(RefineFile::Log) => {
-            "type the path instead, or drop the file onto the window"
-        }
+        FilePurpose::SaveSession => "type a path and press OK",
+        FilePurpose::OpenModel
+        | FilePurpose::OpenLog
+        | FilePurpose::OpenSession
+        | FilePurpose::Refine(RefineFile::Log) => "type the path instead, or drop the file onto the window",
     }
 }
 
@@ -69,6 +72,12 @@ fn ask(purpose: FilePurpose, suggestion: &str) -> Answer {
         FilePurpose::SaveFigure(_) => {
             dialog.set_title("Save the figure").set_file_name(suggestion).save_file()
         }
+        FilePurpose::OpenSession => {
+            dialog.set_title("Open a session").add_filter("Session", &[EXTENSION]).pick_file()
+        }
+        FilePurpose::SaveSession => {
+            dialog.set_title("Save the session").set_file_name(suggestion).save_file()
+        }
         FilePurpose::OpenReplay => {
             dialog.set_title("Replay a recording").add_filter("Recording", &["csv", "log"]).pick_file()
         }
@@ -90,13 +99,13 @@ fn ask(purpose: FilePurpose, suggestion: &str) -> Answer {
 }
 
 #[cfg(not(target_os = "linux"))]
-fn missing_portal() -> Option<&'static str> {
+pub(crate) fn missing_portal() -> Option<&'static str> {
     None
 }
 
 /// Why there can be no dialog: no session bus, or nothing on it that offers one.
 #[cfg(target_os = "linux")]
-fn missing_portal() -> Option<&'static str> {
+pub(crate) fn missing_portal() -> Option<&'static str> {
     let set = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty());
     let on_path = |program: &str| {
         set("PATH").is_some_and(|path| std::env::split_paths(&path).any(|dir| dir.join(program).is_file()))

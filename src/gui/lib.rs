@@ -12,10 +12,12 @@
 mod app;
 mod column_map;
 mod command;
+pub mod command_line;
 mod commands;
 mod context;
 mod design;
 mod dialog;
+mod document;
 mod experiments;
 mod friction;
 mod health_card;
@@ -36,11 +38,13 @@ mod shell_word;
 mod state_out;
 mod tab;
 mod theme;
+mod tour;
 mod tune;
 mod widgets;
 mod window;
 mod write_file;
 
 pub use app::App;
+pub use document::default_folder as default_state_folder;
 pub use tab::Tab;
 pub use window::{WindowError, WindowOptions, run};

@@ -31,6 +31,10 @@ pub(crate) struct Recent {
     pub(crate) slcan: [String; 2],
     /// IMU connected to last: port and baud rate.
     pub(crate) imu: [String; 2],
+    /// Session files.
+    pub(crate) sessions: Vec<PathBuf>,
+    /// Whether the tour was seen or skipped.
+    pub(crate) tour_done: bool,
 }
 
 impl Recent {
@@ -52,6 +56,10 @@ impl Recent {
 
     pub(crate) fn note_recording(&mut self, path: &Path) {
         note(&mut self.recordings, path);
+    }
+
+    pub(crate) fn note_session(&mut self, path: &Path) {
+        note(&mut self.sessions, path);
     }
 
     pub(crate) fn note_model(&mut self, path: &Path) {

@@ -65,6 +65,14 @@ impl Session {
         model
     }
 
+    /// Name of the controller, for people.
+    pub(crate) fn controller_name(&self) -> &'static str {
+        match self.controller {
+            ControllerKind::Lqr => "LQR",
+            ControllerKind::Flqr => "FLQR",
+        }
+    }
+
     /// The robot, where the model is one.
     pub(crate) fn robot(&self) -> Option<&RobotModel> {
         match &self.rig {

@@ -36,6 +36,12 @@ pub struct WindowOptions {
     pub state_out: Option<PathBuf>,
     /// Where the list of recent files is kept; without one it is not kept.
     pub recent_file: Option<PathBuf>,
+    /// A session file to open.
+    pub session: Option<PathBuf>,
+    /// Folder where the running session is kept; without one it is not kept.
+    pub state_folder: Option<PathBuf>,
+    /// Whether the tour may begin, if it was never seen.
+    pub tour: bool,
 }
 
 impl WindowOptions {
@@ -53,6 +59,9 @@ impl WindowOptions {
             paused: false,
             state_out: None,
             recent_file: crate::recent::default_file(),
+            session: None,
+            state_folder: None,
+            tour: false,
         }
     }
 }

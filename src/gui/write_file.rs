@@ -1,6 +1,7 @@
 //! Replacing a file as a whole.
 
 use std::ffi::OsString;
+use std::io::Write;
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -11,11 +12,18 @@ pub(crate) fn write_file(path: &Path, content: &[u8]) -> std::io::Result<()> {
         std::fs::create_dir_all(folder)?;
     }
     let beside = unique_name(path);
-    let written = std::fs::write(&beside, content).and_then(|()| std::fs::rename(&beside, path));
+    let written = write_through(&beside, content).and_then(|()| std::fs::rename(&beside, path));
     if written.is_err() {
         std::fs::remove_file(&beside).ok();
     }
     written
+}
+
+/// A name that points at content that is still on its way would be an empty file after a loss of power.
+fn write_through(path: &OsString, content: &[u8]) -> std::io::Result<()> {
+    let mut file = std::fs::File::create(path)?;
+    file.write_all(content)?;
+    file.sync_all()
 }
 
 fn unique_name(path: &Path) -> OsString {

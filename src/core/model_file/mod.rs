@@ -5,7 +5,9 @@
 //! is silently dropped would leave a default in its place.
 
 mod axis_schema;
+mod changes;
 mod effects_schema;
+mod keep;
 pub mod presets;
 mod refusal;
 mod robot_schema;
@@ -22,6 +24,7 @@ use crate::robot::{
     Surroundings, YawHold,
 };
 use axis_schema::AxisFile;
+pub use changes::Change;
 use refusal::Refusal;
 use robot_schema::RobotFile;
 pub use tolerance::Tolerances;

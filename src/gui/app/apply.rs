@@ -6,10 +6,13 @@ use egui::{Context, Theme};
 use flqr_core::device::{SessionOptions, Source as DeviceSource};
 use flqr_core::model_file::{Model, presets};
 
+use super::questions::Question;
 use super::{App, ModelJob, Saved};
 use crate::command::{Command, FilePurpose, Source, Target};
+use crate::command_line;
 use crate::commands::Palette;
-use crate::dialog::Dialog;
+use crate::dialog::{Dialog, missing_portal};
+use crate::document::Base;
 use crate::friction::Fitted;
 use crate::job::{Job, Outcome};
 use crate::layout::Layout;
@@ -17,6 +20,7 @@ use crate::live::LiveCommand;
 use crate::refine::{RefineCommand, RefineFile, Surroundings};
 use crate::session::Session;
 use crate::tab::Tab;
+use crate::tour::Tour;
 
 /// A model file larger than this is none.
 const LARGEST_MODEL_BYTES: u64 = 1 << 20;
@@ -37,6 +41,8 @@ pub(super) fn chosen(purpose: FilePurpose, path: PathBuf) -> Command {
         FilePurpose::OpenReplay => Command::ChooseReplay(path),
         FilePurpose::SaveRecording => Command::ChooseRecording(path),
         FilePurpose::SaveFigure(file) => Command::ChooseFigure(file, Ok(path)),
+        FilePurpose::OpenSession => Command::OpenSession(path),
+        FilePurpose::SaveSession => Command::SaveSession(path),
         // The dialog knows one name as it was typed; what is written may have another or several.
         FilePurpose::Refine(RefineFile::Log) => {
             Command::Refine(RefineCommand::Load { path, held_out: false })
@@ -72,6 +78,23 @@ impl App {
                 self.tune.focus_weights();
             }
             Command::FocusPath => self.focus_path(),
+            Command::Undo => self.go(false),
+            Command::Redo => self.go(true),
+            Command::ShowSteps => self.question = Some(Question::Steps),
+            Command::StartTour => {
+                self.tour = Some(Tour::default());
+                self.commands.send(Command::SelectTab(Tab::Tune));
+            }
+            Command::CopyCommand => match self.command_line() {
+                Ok(line) => {
+                    self.say(format!("Copied: {line}"));
+                    ctx.copy_text(line);
+                }
+                Err(problem) => self.fail(problem),
+            },
+            Command::AskFile(purpose) => self.ask_file(purpose),
+            Command::OpenSession(path) => self.open_session(path),
+            Command::SaveSession(path) => self.save_session(path, ctx),
             Command::Quit => ctx.send_viewport_cmd(egui::ViewportCommand::Close),
             Command::Stop => self.link.stop(),
             Command::SelectSource(source) => self.select_source(source),
@@ -127,7 +150,8 @@ impl App {
                 self.set_live_interval();
             }
             Command::ShowDialog(purpose) => self.show_dialog(purpose),
-            Command::LoadPreset(number) => self.load_preset(number),
+            Command::LoadPreset(number) => self.ask_preset(number),
+            Command::TakePreset(number) => self.load_preset(number),
             Command::LoadModel(path) => self.load_model(path),
             Command::SaveModel(path) => self.save_model(path, false),
             Command::OverwriteModel(path) => self.save_model(path, true),
@@ -266,6 +290,32 @@ impl App {
         self.say("The weights are those of the loaded model again.");
     }
 
+    /// The command that does in a terminal what the page shows.
+    fn command_line(&self) -> Result<String, String> {
+        let model = self.model_path_of_session();
+        match self.tab {
+            Tab::Tune | Tab::Log => Ok(command_line::gains(model)),
+            Tab::Friction => self.friction.command_line(model),
+            Tab::Refine => self.refine.command_line(&self.session, model),
+            Tab::Experiments => Ok(self.experiments.command_line(model)),
+            Tab::Robot => {
+                let controller = self.session.controller;
+                self.robot.form.command_line(self.source, (&self.session, &self.designer), controller, model)
+            }
+        }
+    }
+
+    /// A dialog, or a field for the path where the desktop has none.
+    fn ask_file(&mut self, purpose: FilePurpose) {
+        match missing_portal() {
+            Some(reason) => self.ask_path(purpose, Some(format!("{reason}: type the path."))),
+            None => {
+                self.asks_path = true;
+                self.show_dialog(purpose);
+            }
+        }
+    }
+
     fn show_dialog(&mut self, purpose: FilePurpose) {
         if self.dialog.is_some() {
             self.say("A file dialog is open already.");
@@ -277,6 +327,7 @@ impl App {
             FilePurpose::Refine(RefineFile::Save(saved_as)) => self.refine.suggested_name(saved_as),
             FilePurpose::SaveRecording => self.robot.suggested_name(),
             FilePurpose::SaveFigure(file) => file.suggestion(),
+            FilePurpose::SaveSession => format!("session.{}", crate::document::EXTENSION),
             _ => name.map_or_else(|| "model.toml".to_owned(), |name| name.to_string_lossy().into_owned()),
         };
         match Dialog::open(purpose, suggestion, &self.waker) {
@@ -302,14 +353,12 @@ impl App {
         }
         // A robot is driven by the model that it was connected with, or not at all.
         self.link.close(&self.waker);
-        self.session = Session::new(model, self.session.controller);
-        self.saved = self.session.clone();
+        let session = Session::new(model, self.session.controller);
+        self.saved = session.clone();
         self.model_path = path;
-        self.tune.load(&self.session, self.model_path.as_deref());
-        self.designer = crate::design::Designer::default();
-        self.designer.update(&self.session);
-        self.designer.note_drag_start();
-        self.reset_live();
+        self.undo.call(format!("load “{}”", session.name));
+        self.base = self.undo.add_base(Base { saved: session.clone(), path: self.model_path.clone() });
+        self.show_model(session);
         if let Some(path) = self.model_path.clone() {
             self.recent.note_model(&path);
             self.save_recent();
@@ -349,11 +398,14 @@ impl App {
         }
         let path = if path.extension().is_none() { path.with_extension("toml") } else { path };
         let replace = replace || self.model_path.as_ref() == Some(&path);
-        let (file, text) = (path.clone(), self.session.model().to_toml());
+        let (file, model) = (path.clone(), self.session.model());
         let write = move |_: &crate::job::Reporter<()>| {
             if !replace && file.symlink_metadata().is_ok() {
                 return Ok(Saved::AnotherIsThere);
             }
+            // Comments and order of the file that is replaced stay.
+            let text = std::fs::read_to_string(&file)
+                .map_or_else(|_| model.to_toml(), |existing| model.to_toml_over(&existing));
             crate::write_file::write_file(&file, text.as_bytes()).map(|()| Saved::Written).map_err(|error| {
                 format!("{} could not be saved: {error}; nothing was changed", file.display())
             })
@@ -397,8 +449,10 @@ impl App {
         self.saved = session;
         self.recent.note_model(&path);
         self.tune.note_saved(&path);
+        self.undo.set_base(self.base, Base { saved: self.saved.clone(), path: Some(path.clone()) });
         self.model_path = Some(path);
         self.save_recent();
+        self.leaving |= std::mem::take(&mut self.leave_after_save);
     }
 
     fn load_log(&mut self, path: &Path) {
@@ -418,6 +472,7 @@ impl App {
     }
 
     fn use_fit(&mut self, target: Target) {
+        self.undo.call("use of the fit");
         let put = |fitted: Fitted| fitted.put_into(&mut self.session.rig, target);
         match self.friction.fitted().and_then(put) {
             Ok(done) => self.say(done),
@@ -435,6 +490,9 @@ impl App {
             Ok(done) => done,
             Err(problem) => return self.fail(problem),
         };
+        if self.session != before {
+            self.undo.call("use of what the search found");
+        }
         if let Some(said) = done.said {
             self.say(said);
         }
@@ -476,7 +534,10 @@ impl App {
             return;
         }
         let Some(path) = files.into_iter().next() else { return };
-        if path.extension().is_some_and(|extension| extension == "toml") {
+        let ends_with = |ending: &str| path.extension().is_some_and(|extension| extension == ending);
+        if ends_with(crate::document::EXTENSION) {
+            self.commands.send(Command::OpenSession(path));
+        } else if ends_with("toml") {
             self.commands.send(Command::LoadModel(path));
         } else {
             self.commands.send(Command::SelectTab(Tab::Friction));

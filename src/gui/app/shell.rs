@@ -29,19 +29,30 @@ impl App {
         Panel::bottom("status").frame(bar).show(ui, |ui| self.status_ui(ui));
         self.page_ui(ui);
         self.palette_ui(ui);
+        self.question_ui(ui.ctx());
+        self.tour_ui(ui);
     }
 
     fn shortcuts(&mut self, ui: &Ui) {
         if self.link.is_hot() && take_stop_keys(ui) {
             self.link.stop();
         }
-        if self.palette.is_some() {
+        if self.palette.is_some() || self.question.is_some() {
             return;
         }
         let Some(entry) = commands::pressed(ui.ctx()) else { return };
         match entry.send(&self.situation(ui.ctx())) {
             Ok(command) => self.commands.send(command),
             Err(reason) => self.commands.send(Command::Say(format!("{}: {reason}.", entry.name))),
+        }
+    }
+
+    fn tour_ui(&mut self, ui: &Ui) {
+        let Some(tour) = self.tour else { return };
+        self.tour = tour.ui(&self.commands, ui.ctx());
+        if self.tour.is_none() {
+            self.recent.tour_done = true;
+            self.save_recent();
         }
     }
 

@@ -62,7 +62,7 @@ pub(super) fn all() -> Vec<Entry> {
 }
 
 fn file() -> Vec<Entry> {
-    let dialog = |purpose| move |_: &Situation<'_>| Ok(Command::ShowDialog(purpose));
+    let dialog = |purpose| move |_: &Situation<'_>| Ok(Command::AskFile(purpose));
     let menu = Menu::File;
     vec![
         entry(
@@ -72,7 +72,7 @@ fn file() -> Vec<Entry> {
             "What this page works on: a model, a log or a recording",
             &[ctrl(Key::O)],
             |s| {
-                Ok(Command::ShowDialog(match s.tab {
+                Ok(Command::AskFile(match s.tab {
                     Tab::Robot if s.source == Source::Replay => FilePurpose::OpenReplay,
                     Tab::Friction => FilePurpose::OpenLog,
                     Tab::Refine => FilePurpose::Refine(RefineFile::Log),
@@ -113,7 +113,7 @@ fn file() -> Vec<Entry> {
             |s| {
                 Ok(match s.model_path {
                     Some(path) => Command::SaveModel(path.to_owned()),
-                    None => Command::ShowDialog(FilePurpose::SaveModel),
+                    None => Command::AskFile(FilePurpose::SaveModel),
                 })
             },
         ),
@@ -124,6 +124,22 @@ fn file() -> Vec<Entry> {
             "To a file of your choice",
             &[ctrl_shift(Key::S)],
             dialog(FilePurpose::SaveModel),
+        ),
+        entry(
+            menu,
+            "open-session",
+            "Open a session…",
+            "Model, layout, sources and forms as they were saved",
+            &[],
+            dialog(FilePurpose::OpenSession),
+        ),
+        entry(
+            menu,
+            "save-session",
+            "Save the session as…",
+            "Model, layout, sources and forms, in one file",
+            &[],
+            dialog(FilePurpose::SaveSession),
         ),
         entry(
             menu,
@@ -157,6 +173,26 @@ fn edit() -> Vec<Entry> {
         move |s: &Situation<'_>| if s.has_robot { Ok(command.clone()) } else { Err(NO_ROBOT) }
     };
     vec![
+        entry(menu, "undo", "Undo", "Take the last step back", &[ctrl(Key::Z)], |s| {
+            if s.can_undo { Ok(Command::Undo) } else { Err("there is nothing to undo") }
+        }),
+        entry(
+            menu,
+            "redo",
+            "Redo",
+            "Make the step again that was taken back",
+            &[ctrl_shift(Key::Z), ctrl(Key::Y)],
+            |s| if s.can_redo { Ok(Command::Redo) } else { Err("there is nothing to redo") },
+        ),
+        entry(
+            menu,
+            "copy-command",
+            "Copy as a command",
+            "What does in a terminal what this page shows",
+            &[],
+            |s| if s.tab == Tab::Log { Err("this page does nothing") } else { Ok(Command::CopyCommand) },
+        ),
+        entry(menu, "steps", "Steps…", "All that can be undone, by name", &[], |_| Ok(Command::ShowSteps)),
         entry(
             menu,
             "weights",
@@ -357,7 +393,10 @@ fn connect(s: &Situation<'_>) -> Command {
 
 fn help() -> Vec<Entry> {
     let menu = Menu::Help;
-    vec![entry(menu, "palette", "Any command…", "This list, with a filter", &[ctrl(Key::K)], |_| {
-        Ok(Command::ShowPalette)
-    })]
+    vec![
+        entry(menu, "tour", "Tour", "A first look, in five steps", &[], |_| Ok(Command::StartTour)),
+        entry(menu, "palette", "Any command…", "This list, with a filter", &[ctrl(Key::K)], |_| {
+            Ok(Command::ShowPalette)
+        }),
+    ]
 }

@@ -62,6 +62,8 @@ pub(crate) struct Situation<'a> {
     pub(crate) is_hot: bool,
     pub(crate) controller: ControllerKind,
     pub(crate) model_path: Option<&'a Path>,
+    pub(crate) can_undo: bool,
+    pub(crate) can_redo: bool,
     pub(crate) is_dark: bool,
     pub(crate) zoom: f32,
     pub(crate) is_usual_layout: bool,

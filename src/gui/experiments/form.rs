@@ -7,16 +7,12 @@ use egui::{Button, ComboBox, DragValue, Grid, ProgressBar, RichText, Ui, vec2};
 use flqr_core::simulate::{Scenario, SpeedGains};
 
 use super::preflight::Preflight;
-use super::run::{Settings, Variant};
+use super::run::{LONGEST_S, SHORTEST_S, Settings, Variant};
 use super::runs::Runs;
 use crate::command::Command;
 use crate::context::ViewContext;
 use crate::theme::palette;
 use crate::widgets::{hint_ui, number_ui, parse, section_ui, warning_ui};
-
-/// Longest run here, s; the command runs longer ones.
-const LONGEST_S: f64 = 600.0;
-const SHORTEST_S: f64 = 0.1;
 
 /// Which of the last entries could not be taken as they were.
 #[derive(Default)]
@@ -83,7 +79,10 @@ fn numbers_ui(settings: &mut Settings, limited: &mut Limited, ui: &mut Ui) {
     ui.label("seed");
     let negative = Cell::new(None);
     let read = |text: &str| parse(text).inspect(|value| negative.set(Some(*value < 0.0)));
-    let field = DragValue::new(&mut settings.seed).min_size(vec2(58.0, 0.0)).custom_parser(read);
+    let field = DragValue::new(&mut settings.seed)
+        .update_while_editing(false)
+        .min_size(vec2(58.0, 0.0))
+        .custom_parser(read);
     let field = ui.add(field).accessible_name("experiment seed");
     if let Some(negative) = negative.get().or(field.changed().then_some(false)) {
         limited.seed = negative;

@@ -15,7 +15,7 @@ mod side_view;
 mod signals;
 mod table;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use egui::{
     CentralPanel, Color32, Context, Frame, Margin, Panel, Rect, RichText, ScrollArea, Ui, Vec2, vec2,
@@ -34,7 +34,8 @@ use form::Limited;
 use playback::Playback;
 use plots::Plots;
 use preflight::Preflight;
-use run::{Settings, Variant};
+pub(crate) use run::Settings;
+use run::Variant;
 use runs::{Comparison, Runs};
 pub(crate) use save::SavedAs;
 use save::{Extent, Saver};
@@ -81,6 +82,40 @@ impl Default for ExperimentsTab {
 }
 
 impl ExperimentsTab {
+    /// What the next runs are made with.
+    pub(crate) fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    pub(crate) fn set_settings(&mut self, settings: Settings) {
+        self.settings = settings;
+        self.limited = Limited::default();
+    }
+
+    /// The command that makes the run with friction compensation.
+    pub(crate) fn command_line(&self, model: Option<&Path>) -> String {
+        run::command_line(&self.settings, Variant::Compensated, model)
+    }
+
+    /// For a session file.
+    pub(crate) fn to_value(&self) -> serde_json::Value {
+        self.settings.to_value()
+    }
+
+    /// From a session file.
+    pub(crate) fn take_value(&mut self, value: &serde_json::Value) -> Result<(), String> {
+        self.set_settings(Settings::from_value(value)?);
+        Ok(())
+    }
+
+    pub(crate) fn degrees(&self) -> bool {
+        self.plots.stack.units.degrees
+    }
+
+    pub(crate) fn set_degrees(&mut self, degrees: bool) {
+        self.plots.stack.units.degrees = degrees;
+    }
+
     /// Starts both runs on `model`, which `path` holds if it is saved.
     pub(crate) fn start(&mut self, model: Model, path: Option<PathBuf>, waker: &Waker) -> Result<(), String> {
         self.saver.problem = None;

@@ -13,9 +13,13 @@ use flqr_core::simulate::{
 
 use crate::shell_word::quoted;
 
+/// Longest run here, s; the command runs longer ones.
+pub(super) const LONGEST_S: f64 = 600.0;
+pub(super) const SHORTEST_S: f64 = 0.1;
+
 /// What both runs are made with; plain data, apart from their results.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Settings {
+pub(crate) struct Settings {
     pub(super) scenario: Scenario,
     pub(super) seconds: f64,
     pub(super) seed: u64,
@@ -37,6 +41,31 @@ impl Settings {
             *self =
                 Self { scenario, seconds: scenario.default_seconds(), speed_gains: None, seed: self.seed };
         }
+    }
+
+    /// For a session file.
+    pub(super) fn to_value(&self) -> serde_json::Value {
+        serde_json::json!({
+            "scenario": self.scenario.name(),
+            "seconds": self.seconds,
+            "seed": self.seed,
+            "speed_gains": self.speed_gains.map(|gains| [gains.kp, gains.ki]),
+        })
+    }
+
+    /// From a session file.
+    pub(super) fn from_value(value: &serde_json::Value) -> Result<Self, String> {
+        let refused = |key: &str| format!("“{key}” of the experiment cannot be read");
+        let name = value["scenario"].as_str().ok_or_else(|| refused("scenario"))?;
+        let scenario: Scenario = name.parse().map_err(|_| refused("scenario"))?;
+        let seconds = value["seconds"].as_f64().filter(|seconds| seconds.is_finite());
+        let gain = |index: usize| value["speed_gains"][index].as_f64().filter(|gain| *gain >= 0.0);
+        Ok(Self {
+            scenario,
+            seconds: seconds.ok_or_else(|| refused("seconds"))?.clamp(SHORTEST_S, LONGEST_S),
+            seed: value["seed"].as_u64().ok_or_else(|| refused("seed"))?,
+            speed_gains: gain(0).zip(gain(1)).map(|(kp, ki)| SpeedGains { kp, ki }),
+        })
     }
 
     fn experiment(&self, variant: Variant) -> Experiment {

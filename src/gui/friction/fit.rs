@@ -1,12 +1,13 @@
 //! A fit on a worker thread, with live convergence and cancel.
 
+use std::path::Path;
 use std::sync::Arc;
 
 use egui::{ProgressBar, RichText, TextEdit, Ui};
 use flqr_core::friction::{Stribeck, StribeckParameters};
 use flqr_core::identify::{Bounds, FitOptions, FitProgress, FitReport, Method, Motor, fit};
 use flqr_core::model_file::{AxisParameters, Model, Rig};
-use flqr_core::record::LogKind;
+use flqr_core::record::{LogKind, Mapping};
 
 use super::fitted::Fitted;
 use crate::command::Command;
@@ -80,12 +81,7 @@ impl FitRun {
         let model = fitting_model(loaded.kind.as_ref().ok().copied(), model).filter(|_| self.from_model);
         self.held = model.is_some();
         let motor = self.motor;
-        let options = FitOptions {
-            method: self.method,
-            bounds: self.bounds,
-            estimate: self.names_to_estimate(),
-            seed: self.seed,
-        };
+        let options = self.options();
         let work = move |reporter: &crate::job::Reporter<Step>| {
             let mut watch = |progress: &FitProgress| {
                 reporter.progress(Step {
@@ -100,6 +96,21 @@ impl FitRun {
         };
         self.job = Some(Job::start("fit", waker, work).map_err(|e| format!("No thread for the fit: {e}."))?);
         Ok(())
+    }
+
+    fn options(&self) -> FitOptions {
+        FitOptions {
+            method: self.method,
+            bounds: self.bounds,
+            estimate: self.names_to_estimate(),
+            seed: self.seed,
+        }
+    }
+
+    /// The command that makes this fit; `model` is the file that holds the session's model.
+    pub(super) fn command_line(&self, log: &Path, map: &[Mapping], model: Option<&Path>) -> String {
+        let model = self.from_model.then_some(model);
+        crate::command_line::fit(log, map, self.motor, &self.options(), model)
     }
 
     fn names_to_estimate(&self) -> Vec<String> {

@@ -84,6 +84,18 @@ impl FrictionTab {
         self.fit.cancel();
     }
 
+    /// Where the log came from.
+    pub(crate) fn log_path(&self) -> Option<&Path> {
+        self.loader.log().map(|loaded| &*loaded.path)
+    }
+
+    /// The command that makes the fit of the loaded log.
+    pub(crate) fn command_line(&self, model: Option<&Path>) -> Result<String, String> {
+        let log = self.log_path().ok_or("There is no log to fit: load one first.")?;
+        let map = self.source.column_map.parse()?;
+        Ok(self.fit.command_line(log, map.entries(), model))
+    }
+
     pub(crate) fn has_log(&self) -> bool {
         self.loader.log().is_some()
     }

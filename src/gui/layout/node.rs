@@ -33,6 +33,9 @@ impl Side {
     }
 }
 
+/// Files nested deeper than this are not of this program.
+const DEEPEST: usize = 12;
+
 /// A part of a layout.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Node {
@@ -157,6 +160,36 @@ impl Node {
             }),
         }
     }
+
+    /// From a file: what is of use of it, with every page once; none where nothing is.
+    pub(crate) fn from_value(value: &Value) -> Option<Self> {
+        let node = Self::read(value, DEEPEST)?;
+        node.without(&mut Vec::new()).map(|node| node.mended())
+    }
+
+    fn read(value: &Value, depth: usize) -> Option<Self> {
+        let list = |key: &str| value.get(key).and_then(Value::as_array);
+        if let Some(tabs) = list("tabs") {
+            let tab = |value: &Value| Tab::from_key(value.as_str()?);
+            let active = value.get("front").and_then(tab);
+            return Some(Self::Tabs { tabs: tabs.iter().filter_map(tab).collect(), active });
+        }
+        let children = list("parts")?;
+        let depth = depth.checked_sub(1)?;
+        let share =
+            |index: usize| list("shares").and_then(|all| all.get(index)?.as_f64()).unwrap_or(1.0) as f32;
+        let read: Vec<(f32, Self)> = children
+            .iter()
+            .enumerate()
+            .filter_map(|(index, child)| Some((share(index), Self::read(child, depth)?)))
+            .collect();
+        let (shares, children) = read.into_iter().unzip();
+        Some(Self::Split {
+            below: value.get("split").and_then(Value::as_str) == Some("below"),
+            shares,
+            children,
+        })
+    }
 }
 
 #[cfg(test)]
@@ -188,5 +221,35 @@ mod tests {
         assert_eq!(tabs_of(&children[1]), [Tab::Friction]);
         let back = below.moved(Tab::Friction, Side::Back).moved(Tab::Robot, Side::Back);
         assert!(back.is_alike(&usual), "{back:?}");
+    }
+
+    #[test]
+    fn a_layout_survives_its_file() {
+        let node = Node::default().moved(Tab::Robot, Side::Right).moved(Tab::Tune, Side::Below);
+        assert_eq!(Node::from_value(&node.to_value()), Some(node));
+    }
+
+    #[test]
+    fn whatever_is_in_the_file_every_page_is_there_once() {
+        let mut deep = json!({ "tabs": ["tune"] });
+        for _ in 0..100 {
+            deep = json!({ "parts": [deep, { "tabs": ["robot"] }] });
+        }
+        for (value, used) in [
+            (json!({ "tabs": ["tune", "tune", "nonsense", 3], "front": "friction" }), true),
+            (json!({ "parts": [{ "tabs": ["robot"] }, { "parts": [] }], "shares": [-1.0, null, "x"] }), true),
+            (
+                json!({ "split": "below", "parts": [{ "tabs": ["log"] }, { "tabs": ["tune"] }], "shares": [1e300] }),
+                true,
+            ),
+            (deep, true),
+            (json!(null), false),
+            (json!({ "parts": 3 }), false),
+            (json!({ "tabs": [] }), false),
+        ] {
+            let node = Node::from_value(&value);
+            assert_eq!(node.is_some(), used, "{value}");
+            has_every_page_once(&node.unwrap_or_default());
+        }
     }
 }

@@ -12,7 +12,7 @@ mod save;
 mod sources;
 mod strip;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use egui::{CentralPanel, Frame, Margin, Panel, RichText, ScrollArea, Ui};
 use flqr_core::model_file::Model;
@@ -148,6 +148,14 @@ impl RefineTab {
             return Err("The demonstration needs the preset of the paper's robot, unchanged.".to_owned());
         }
         self.run.start(question, made, around.model_path, around.waker)
+    }
+
+    /// The command that puts the question of this page; `model` is the file that holds the session's model.
+    pub(crate) fn command_line(&self, session: &Session, model: Option<&Path>) -> Result<String, String> {
+        match form::why_not(&self.sources) {
+            Some(why_not) => Err(why_not.to_owned()),
+            None => Ok(self.made(session).command_line(Question::Refine, model)),
+        }
     }
 
     /// What a question put now would be made of.

@@ -1,12 +1,16 @@
 //! What to connect to, and what may be done with it.
 
+use std::path::Path;
+
 use egui::{Button, CollapsingHeader, ComboBox, Grid, RichText, TextEdit, Ui, vec2};
+use flqr_core::control::ControllerKind;
 use flqr_core::control::drive::Excitation;
 use flqr_core::device::{
     Described, Interfaces, SerialAddress, SessionMode, SessionOptions, Source as DeviceSource,
 };
 
 use flqr_core::link::dbc::Choice;
+use serde::{Deserialize, Serialize};
 
 use super::link::sentence;
 use super::offers::{can_ui, ports_ui};
@@ -65,7 +69,8 @@ impl Task {
 }
 
 /// What has been typed and chosen.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub(crate) struct ConnectionForm {
     pub(crate) interface: String,
     pub(crate) port: String,
@@ -77,10 +82,14 @@ pub(crate) struct ConnectionForm {
     /// Path of a DBC file and which of its signals are what; empty of a robot with LK motors.
     dbc: String,
     signals: String,
+    /// Never kept: a robot is listened to until somebody says otherwise.
+    #[serde(skip)]
     pub(super) may_drive: bool,
+    #[serde(skip)]
     task: Task,
     air_s: f64,
     /// Why there is no file dialog.
+    #[serde(skip)]
     pub(super) dialog_problem: Option<String>,
 }
 
@@ -122,6 +131,42 @@ impl ConnectionForm {
     pub(crate) fn fill_imu(&mut self, imu: &SerialAddress) {
         self.imu_port.clone_from(&imu.port);
         self.imu_baud = imu.baud.to_string();
+    }
+
+    /// The command that connects as this form would.
+    pub(crate) fn command_line(
+        &self,
+        source: Source,
+        (session, designer): (&Session, &Designer),
+        controller: ControllerKind,
+        model: Option<&Path>,
+    ) -> Result<String, String> {
+        if source == Source::Simulated {
+            return Err("The simulated robot needs no connection: see the Experiments page.".to_owned());
+        }
+        let options = self.options(source, session, designer)?;
+        Ok(crate::command_line::robot(&options, &self.signal_words(), controller, model))
+    }
+
+    fn signal_words(&self) -> Vec<&str> {
+        self.signals.split([' ', ',', ';', '\n']).filter(|word| !word.is_empty()).collect()
+    }
+
+    /// For a session file: all but what arms a robot.
+    pub(crate) fn to_value(&self) -> serde_json::Value {
+        serde_json::to_value(self).expect("strings and finite numbers always have a JSON form")
+    }
+
+    /// From a session file.
+    pub(crate) fn take_value(&mut self, value: &serde_json::Value) -> Result<(), String> {
+        let read: Self =
+            serde_json::from_value(value.clone()).map_err(|_| "“connection” cannot be read".to_owned())?;
+        *self = Self {
+            replay_speed: read.replay_speed.clamp(REPLAY_SPEEDS[0], REPLAY_SPEEDS[1]),
+            air_s: read.air_s.clamp(AIR_SECONDS[0], AIR_SECONDS[1]),
+            ..read
+        };
+        Ok(())
     }
 
     /// What to open; one sentence where something is missing.
@@ -186,8 +231,10 @@ impl ConnectionForm {
         if file.is_empty() || !matches!(source, Source::Can | Source::Slcan | Source::Replay) {
             return Ok(None);
         }
-        let words = self.signals.split([' ', ',', ';', '\n']).filter(|word| !word.is_empty());
-        let signals = words.map(|word| word.parse::<Choice>().map_err(|error| sentence(&error.to_string())));
+        let signals = self
+            .signal_words()
+            .into_iter()
+            .map(|word| word.parse::<Choice>().map_err(|error| sentence(&error.to_string())));
         let signals = signals.collect::<Result<Vec<_>, _>>()?;
         if signals.is_empty() {
             return Err("No signal of the DBC file is chosen: type for instance pitch=Imu.Pitch.".to_owned());

@@ -4,21 +4,11 @@
 
 mod common;
 
-use common::{SIZE, Window, click, open, options, state};
+use common::{SIZE, Window, click, command, open, options, state};
 use egui::{Event, Key, Modifiers};
 use egui_kittest::kittest::Queryable;
 use flqr_gui::{Tab, WindowOptions};
 use serde_json::json;
-
-/// Finds a command by its name, as a person would, and takes the first.
-fn command(window: &mut Window, name: &str) {
-    window.key_press_modifiers(Modifiers::COMMAND, Key::K);
-    window.run_steps(3);
-    window.event(Event::Text(name.to_owned()));
-    window.run_steps(2);
-    window.key_press(Key::Enter);
-    window.run_steps(4);
-}
 
 fn message(window: &Window) -> String {
     state(window)["message"].as_str().unwrap().to_owned()

@@ -199,6 +199,7 @@ fn a_log_is_loaded_by_path_fitted_and_used() {
     let used = state(&window);
     assert_eq!(used["friction"][1]["coulomb_nm"].as_f64(), Some(coulomb));
     assert_eq!(used["friction"][0], loaded["friction"][0], "the left motor is as before");
+    assert_eq!(used["undo"], serde_json::json!(["use of the fit"]));
     click(&mut window, "Rows");
     window.get_by_label("speed_rad_s");
 }

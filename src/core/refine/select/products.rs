@@ -81,56 +81,50 @@ impl WithSimd for AddProducts<'_> {
     fn with_simd<S: Simd>(self, simd: S) {
         let Self { gram, columns, rows } = self;
         let count = columns.len();
-        // Columns beyond the last are the last again, and their sums are dropped.
-        let tile = |first: usize, rows: std::ops::Range<usize>| -> [&[f64]; TILE] {
-            std::array::from_fn(|i| &columns[(first + i).min(count - 1)][rows.clone()])
-        };
-        let places: Vec<[usize; 2]> = (0..count)
-            .step_by(TILE)
-            .flat_map(|right| (right..count).step_by(TILE).map(move |left| [left, right]))
-            .collect();
-        let mut sums = vec![[[simd.splat_f64s(0.0); TILE]; TILE]; places.len()];
-        let whole = rows.start..rows.end - (rows.end - rows.start) % S::F64_LANES;
-        for from in whole.clone().step_by(CHUNK) {
-            let chunk = from..(from + CHUNK).min(whole.end);
-            for (&[left, right], sums) in places.iter().zip(&mut sums) {
-                add_products(simd, tile(left, chunk.clone()), tile(right, chunk.clone()), sums);
-            }
-        }
-        let rest = whole.end..rows.end;
-        for ([left, right], sums) in places.into_iter().zip(sums) {
-            for (j, sums) in (right..count).zip(sums) {
-                for (i, sum) in (left..count).zip(sums) {
-                    let rest = columns[i][rest.clone()].iter().zip(&columns[j][rest.clone()]);
-                    gram[(i, j)] += simd.reduce_sum_f64s(sum) + rest.map(|(a, b)| a * b).sum::<f64>();
+        for from in rows.clone().step_by(CHUNK) {
+            let chunk = from..(from + CHUNK).min(rows.end);
+            // Columns beyond the last are the last again, and their sums are dropped.
+            let tile = |first: usize| -> [&[f64]; TILE] {
+                std::array::from_fn(|i| &columns[(first + i).min(count - 1)][chunk.clone()])
+            };
+            for right in (0..count).step_by(TILE) {
+                for left in (right..count).step_by(TILE) {
+                    let sums = products(simd, tile(left), tile(right));
+                    for (j, sums) in (right..count).zip(sums) {
+                        for (i, sum) in (left..count).zip(sums) {
+                            gram[(i, j)] += sum;
+                        }
+                    }
                 }
             }
         }
     }
 }
 
-/// Adds left right to the sum of each pair: those with the first of `right` first. The rows fill whole vectors.
+/// Σ left right for each pair: those with the first of `right` first.
 #[inline(always)]
-fn add_products<'a, S: Simd>(
-    simd: S,
-    left: [&'a [f64]; TILE],
-    right: [&'a [f64]; TILE],
-    sums: &mut [[S::f64s; TILE]; TILE],
-) {
-    let count = S::as_simd_f64s(left[0]).0.len();
-    // All of one length, so that no place has to be checked.
-    let vectors = |column: &'a [f64]| &S::as_simd_f64s(column).0[..count];
-    let (lefts, rights) = (left.map(vectors), right.map(vectors));
-    let mut own = *sums;
-    for place in 0..count {
-        let (left, right) = (lefts.map(|column| column[place]), rights.map(|column| column[place]));
-        for (sums, right) in own.iter_mut().zip(right) {
+fn products<S: Simd>(simd: S, left: [&[f64]; TILE], right: [&[f64]; TILE]) -> [[f64; TILE]; TILE] {
+    let split = |column: &'_ [f64]| S::as_simd_f64s(column).1.len();
+    let (rest, whole) = (split(left[0]), S::as_simd_f64s(left[0]).0.len());
+    let vectors = |columns: [&'_ [f64]; TILE], place: usize| -> [S::f64s; TILE] {
+        std::array::from_fn(|i| S::as_simd_f64s(columns[i]).0[place])
+    };
+    let mut sums = [[simd.splat_f64s(0.0); TILE]; TILE];
+    for place in 0..whole {
+        let (left, right) = (vectors(left, place), vectors(right, place));
+        for (sums, right) in sums.iter_mut().zip(right) {
             for (sum, left) in sums.iter_mut().zip(left) {
                 *sum = simd.mul_add_e_f64s(left, right, *sum);
             }
         }
     }
-    *sums = own;
+    let cut = left[0].len() - rest;
+    std::array::from_fn(|j| {
+        std::array::from_fn(|i| {
+            let rest: f64 = left[i][cut..].iter().zip(&right[j][cut..]).map(|(a, b)| a * b).sum();
+            simd.reduce_sum_f64s(sums[j][i]) + rest
+        })
+    })
 }
 
 fn mirror(gram: &mut DMatrix<f64>) {

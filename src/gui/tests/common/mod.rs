@@ -90,6 +90,16 @@ pub(crate) fn click(window: &mut Window, label: &str) {
     window.run_steps(3);
 }
 
+/// Finds a command by its name, as a person would, and takes the first.
+pub(crate) fn command(window: &mut Window, name: &str) {
+    window.key_press_modifiers(Modifiers::COMMAND, Key::K);
+    window.run_steps(3);
+    window.event(Event::Text(name.to_owned()));
+    window.run_steps(2);
+    window.key_press(Key::Enter);
+    window.run_steps(4);
+}
+
 /// A file that is removed with the test.
 pub(crate) struct TempFile(pub(crate) PathBuf);
 

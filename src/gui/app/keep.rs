@@ -1,0 +1,340 @@
+//! Undo, the session's file, and the end of the window.
+
+use std::path::{Path, PathBuf};
+
+use egui::{Context, Theme, ViewportCommand};
+
+use super::App;
+use super::questions::Question;
+use crate::command::Command;
+use crate::document::{self, Base, Content, Document, Opened};
+use crate::job::{Job, Outcome, Reporter, Waker};
+use crate::session::Session;
+use crate::write_file::write_file;
+
+/// A job on a session file: what was read of it, or that it was written.
+pub(super) enum SessionJob {
+    Open(PathBuf, Job<(), Result<String, String>>),
+    Save(PathBuf, Job<(), Result<(), String>>),
+}
+
+/// Looks for what was kept, on a thread.
+pub(super) fn open_store(folder: Option<PathBuf>, waker: &Waker) -> std::io::Result<Option<Job<(), Opened>>> {
+    folder.map(|folder| Job::start("open-session", waker, move |_| document::open(&folder))).transpose()
+}
+
+impl App {
+    /// Takes in what was edited: each drag, typed value, load or use of a fit is one step.
+    pub(super) fn watch_undo(&mut self, ctx: &Context) {
+        let settled = !ctx.input(|input| input.pointer.any_down());
+        self.watch(settled);
+    }
+
+    fn watch(&mut self, settled: bool) {
+        let layout = self.layout.node();
+        let now = self.undo.now();
+        let is_same = now.base == self.base
+            && now.session == self.session
+            && now.experiment == *self.experiments.settings()
+            && now.layout.is_alike(&layout);
+        let content = || Content {
+            session: self.session.clone(),
+            base: self.base,
+            experiment: self.experiments.settings().clone(),
+            layout,
+        };
+        self.undo.watch(content, is_same, settled);
+    }
+
+    /// One step back, or forth.
+    pub(super) fn go(&mut self, redo: bool) {
+        self.watch(true);
+        let Some(content) = self.undo.peek(redo) else {
+            return self.say(if redo { "There is nothing to redo." } else { "There is nothing to undo." });
+        };
+        if content.base != self.base && self.link.is_hot() {
+            return self.fail("The robot may move: stop it before taking another model.");
+        }
+        let Some((name, content)) = self.undo.go(redo) else { return };
+        self.experiments.set_settings(content.experiment);
+        if !content.layout.is_alike(&self.layout.node()) {
+            self.layout.set_node(&content.layout);
+            self.layout.select(self.tab);
+        }
+        if content.base != self.base {
+            self.take_base(content.base, content.session);
+        } else if content.session != self.session {
+            self.session = content.session;
+            self.tune.refresh(&self.session);
+            self.designer.update(&self.session);
+            self.send_robot();
+        }
+        self.say(format!("{}: {name}.", if redo { "Done again" } else { "Undone" }));
+    }
+
+    /// Goes to a model that was loaded before.
+    fn take_base(&mut self, number: usize, session: Session) {
+        let Some(Base { saved, path }) = self.undo.base(number).cloned() else { return };
+        self.link.close(&self.waker);
+        self.base = number;
+        self.saved = saved;
+        self.model_path = path;
+        self.show_model(session);
+    }
+
+    /// Shows a session in place of the one before, from its start.
+    pub(super) fn show_model(&mut self, session: Session) {
+        self.session = session;
+        self.tune.load(&self.session, self.model_path.as_deref());
+        self.designer = crate::design::Designer::default();
+        self.designer.update(&self.session);
+        self.designer.note_drag_start();
+        self.reset_live();
+    }
+
+    /// All that a session file keeps.
+    fn document(&self, ctx: &Context) -> Document {
+        let changed = self.session != self.saved;
+        let column_map = self.friction.column_map();
+        Document {
+            model: Some(self.session.model()),
+            saved_model: changed.then(|| self.saved.model()),
+            model_path: self.model_path.clone(),
+            controller: Some(self.session.controller),
+            experiment: Some(self.experiments.to_value()),
+            column_map: (!column_map.is_empty()).then_some(column_map),
+            log: self.friction.log_path().map(Path::to_owned),
+            source: Some(self.source),
+            connection: Some(self.robot.form.to_value()),
+            layout: Some(self.layout.node()),
+            tab: Some(self.tab),
+            dark: Some(ctx.global_style().visuals.dark_mode),
+            zoom: Some(ctx.zoom_factor()),
+            degrees: Some(self.experiments.degrees()),
+            runs: self.runs.clone(),
+        }
+    }
+
+    /// Takes over how the window looks and what its forms hold.
+    fn take_surroundings(&mut self, document: &Document, ctx: &Context) -> Vec<String> {
+        let mut problems = Vec::new();
+        if let Some(layout) = &document.layout {
+            self.layout.set_node(layout);
+            self.layout.select(self.tab);
+        }
+        if let Some(dark) = document.dark {
+            ctx.set_theme(if dark { Theme::Dark } else { Theme::Light });
+        }
+        if let Some(zoom) = document.zoom {
+            self.commands.send(Command::SetZoom(zoom));
+        }
+        if let Some(degrees) = document.degrees {
+            self.experiments.set_degrees(degrees);
+        }
+        if let Some(map) = &document.column_map {
+            self.friction.suggest_column_map(map);
+        }
+        if let Some(value) = &document.experiment {
+            problems.extend(self.experiments.take_value(value).err());
+        }
+        if let Some(value) = &document.connection {
+            problems.extend(self.robot.form.take_value(value).err());
+        }
+        self.runs = document.runs.clone().or(self.runs.take());
+        problems
+    }
+
+    /// Takes over a session as a whole; nothing is connected by that.
+    pub(super) fn take_document(&mut self, name: &str, document: Document, ctx: &Context) {
+        if self.link.is_hot() {
+            return self.fail("The robot may move: stop it before taking another session.");
+        }
+        self.undo.call(format!("open {name}"));
+        if let Some(model) = document.model.clone() {
+            let controller = document.controller.unwrap_or(self.session.controller);
+            let saved = document.saved_model.clone().unwrap_or_else(|| model.clone());
+            self.link.close(&self.waker);
+            self.saved = Session::new(saved, controller);
+            self.model_path.clone_from(&document.model_path);
+            self.base = self.undo.add_base(Base { saved: self.saved.clone(), path: self.model_path.clone() });
+            self.show_model(Session::new(model, controller));
+        }
+        if let Some(source) = document.source {
+            self.commands.send(Command::SelectSource(source));
+        }
+        if let Some(log) = document.log.clone() {
+            self.commands.send(Command::LoadLog(log));
+        }
+        for problem in self.take_surroundings(&document, ctx) {
+            self.fail(format!("{name}: {problem}."));
+        }
+        if let Some(tab) = document.tab {
+            self.commands.send(Command::SelectTab(tab));
+        }
+        self.commands.send(Command::Say(format!("The session of {name} is back.")));
+    }
+
+    /// Says what of a session file was not read, if anything.
+    pub(super) fn say_unread(&mut self, path: &Path, problems: &[String]) {
+        if !problems.is_empty() {
+            self.fail(format!(
+                "Of the session file {} not all was read: {}. The file is kept there as it is.",
+                path.display(),
+                problems.join("; ")
+            ));
+        }
+    }
+
+    /// Keeps the session, and takes in what was kept.
+    pub(super) fn keep_session(&mut self, ctx: &Context) {
+        self.drain_opening(ctx);
+        self.drain_session_job(ctx);
+        let Some(store) = &mut self.store else { return };
+        let said = store.drain();
+        if let Some(wait) = store.wait() {
+            if ctx.input(|input| !input.raw.events.is_empty()) {
+                ctx.request_repaint_after(wait);
+            }
+        } else {
+            let text = self.document(ctx).to_json();
+            if let Some(store) = &mut self.store {
+                store.keep(text, &self.waker);
+            }
+        }
+        match said {
+            None => {}
+            Some(Ok(text)) => self.say(text),
+            Some(Err(problem)) => self.fail(problem),
+        }
+    }
+
+    fn drain_opening(&mut self, ctx: &Context) {
+        let Some(job) = &mut self.opening else { return };
+        let opened = match job.poll().1 {
+            Outcome::Running => return,
+            Outcome::Done(opened) => opened,
+            Outcome::Broken => return self.opening = None,
+        };
+        self.opening = None;
+        if let Some(problem) = opened.problem {
+            self.fail(problem);
+        }
+        self.store = opened.store;
+        let left = opened.left.map(|(path, text)| {
+            let (document, problems) = Document::from_json(&text);
+            (path, document, problems)
+        });
+        if let Some((path, _, problems)) = &left {
+            self.say_unread(path, problems);
+        }
+        match left {
+            Some((path, document, problems)) if document.may_have_unsaved_model(&problems) => {
+                self.take_surroundings(&document, ctx);
+                let whole = problems.is_empty();
+                self.question = Some(Question::Restore { path, document: Box::new(document), whole });
+            }
+            Some((path, document, problems)) => {
+                self.take_surroundings(&document, ctx);
+                if problems.is_empty() {
+                    std::fs::remove_file(path).ok();
+                }
+            }
+            None => {
+                let Some(last) = opened.last else { return };
+                let (document, _) = Document::from_json(&last);
+                self.take_surroundings(&document, ctx);
+            }
+        }
+    }
+
+    pub(super) fn open_session(&mut self, path: PathBuf) {
+        if self.session_job.is_some() {
+            return self
+                .fail("A session file is still being read or written: try again when that has ended.");
+        }
+        let file = path.clone();
+        let read = move |_: &Reporter<()>| {
+            let problem = |error: std::io::Error| {
+                format!("{} could not be opened: {error}; check the path", file.display())
+            };
+            let size = std::fs::metadata(&file).map_err(problem)?.len();
+            if size > document::LARGEST_BYTES {
+                return Err(format!("{} is no session file: it has {size} bytes", file.display()));
+            }
+            let bytes = std::fs::read(&file).map_err(problem)?;
+            Ok(String::from_utf8_lossy(&bytes).into_owned())
+        };
+        match Job::start("open-session", &self.waker, read) {
+            Ok(job) => self.session_job = Some(SessionJob::Open(path, job)),
+            Err(error) => self.fail(format!("No thread to open the session: {error}.")),
+        }
+    }
+
+    pub(super) fn save_session(&mut self, path: PathBuf, ctx: &Context) {
+        if self.session_job.is_some() {
+            return self
+                .fail("A session file is still being read or written: try again when that has ended.");
+        }
+        let path = if path.extension().is_none() { path.with_extension(document::EXTENSION) } else { path };
+        let (file, text) = (path.clone(), self.document(ctx).to_json());
+        let write = move |_: &Reporter<()>| {
+            write_file(&file, text.as_bytes()).map_err(|error| {
+                format!("{} could not be saved: {error}; nothing was changed", file.display())
+            })
+        };
+        match Job::start("save-session", &self.waker, write) {
+            Ok(job) => self.session_job = Some(SessionJob::Save(path, job)),
+            Err(error) => self.fail(format!("No thread to save the session: {error}.")),
+        }
+    }
+
+    fn drain_session_job(&mut self, ctx: &Context) {
+        match self.session_job.take() {
+            None => {}
+            Some(SessionJob::Open(path, mut job)) => match job.poll().1 {
+                Outcome::Running => self.session_job = Some(SessionJob::Open(path, job)),
+                Outcome::Done(Ok(text)) => {
+                    let (document, problems) = Document::from_json(&text);
+                    if document != Document::default() {
+                        self.take_document(&path.display().to_string(), document, ctx);
+                        self.recent.note_session(&path);
+                        self.save_recent();
+                    }
+                    self.say_unread(&path, &problems);
+                }
+                Outcome::Done(Err(problem)) => self.fail(problem),
+                Outcome::Broken => self.fail("Opening the session failed: this is a defect of flqr."),
+            },
+            Some(SessionJob::Save(path, mut job)) => match job.poll().1 {
+                Outcome::Running => self.session_job = Some(SessionJob::Save(path, job)),
+                Outcome::Done(Ok(())) => {
+                    self.say(format!("The session is saved to {}.", path.display()));
+                    self.recent.note_session(&path);
+                    self.save_recent();
+                }
+                Outcome::Done(Err(problem)) => self.fail(problem),
+                Outcome::Broken => self.fail("Saving the session failed: this is a defect of flqr."),
+            },
+        }
+    }
+
+    /// Asks before changes of the model are lost with the window.
+    pub(super) fn answer_close(&mut self, ctx: &Context) {
+        if self.leaving {
+            ctx.send_viewport_cmd(ViewportCommand::Close);
+            return;
+        }
+        if ctx.input(|input| input.viewport().close_requested()) && self.session != self.saved {
+            ctx.send_viewport_cmd(ViewportCommand::CancelClose);
+            self.question = Some(Question::Leave);
+        }
+    }
+
+    /// The window is closed: its session is the last one.
+    pub fn end(&mut self) {
+        let text = self.document(&self.ctx.clone()).to_json();
+        if let Some(store) = &mut self.store {
+            store.close(&text);
+        }
+    }
+}

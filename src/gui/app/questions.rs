@@ -1,0 +1,337 @@
+//! What is asked before something is lost or replaced.
+
+use std::path::{Path, PathBuf};
+
+use egui::{Context, Grid, Modal, RichText, ScrollArea, TextEdit, Ui};
+use flqr_core::model_file::{Change, Model, presets};
+
+use super::{App, apply};
+use crate::command::{Command, FilePurpose};
+use crate::document::{Document, words};
+use crate::recent::Recent;
+use crate::widgets::{hint_ui, mono, warning_ui};
+
+/// Rows of a table of changes that are shown at once.
+const LONGEST_TABLE: f32 = 340.0;
+
+/// An open question.
+pub(super) enum Question {
+    /// The window is to be closed, and the model is not saved.
+    Leave,
+    /// A preset is to replace the model.
+    Preset { number: usize, name: &'static str, changes: Vec<Change> },
+    /// A window was not closed.
+    Restore { path: PathBuf, document: Box<Document>, whole: bool },
+    /// A path is wanted; why there is no dialog for it.
+    Path { purpose: FilePurpose, text: String, reason: Option<String>, has_focus: bool },
+    /// What can be undone.
+    Steps,
+}
+
+/// What an answer asks for.
+enum Answer {
+    Open,
+    Close,
+    Send(Command),
+    SaveAndLeave,
+    Discard,
+    Restore,
+    StartAfresh,
+    Undo(usize),
+    Redo(usize),
+}
+
+impl Question {
+    /// For scripts.
+    pub(super) fn key(&self) -> &'static str {
+        match self {
+            Self::Leave => "leave",
+            Self::Preset { .. } => "preset",
+            Self::Restore { .. } => "restore",
+            Self::Path { .. } => "path",
+            Self::Steps => "steps",
+        }
+    }
+}
+
+impl App {
+    /// Asks before a preset replaces the model, with what changes.
+    pub(super) fn ask_preset(&mut self, number: usize) {
+        let Some((name, text)) = presets::ALL.get(number) else { return };
+        match Model::from_toml(text, name) {
+            Ok(model) => {
+                let changes = self.session.model().changes_to(&model);
+                self.question = Some(Question::Preset { number, name, changes });
+            }
+            Err(error) => self.fail(error.to_string()),
+        }
+    }
+
+    /// Asks for a path, because there is no dialog or none is wanted.
+    pub(super) fn ask_path(&mut self, purpose: FilePurpose, reason: Option<String>) {
+        let text = match purpose {
+            FilePurpose::SaveModel => self.model_path.as_deref(),
+            _ => None,
+        };
+        let text = text.map(|path| path.display().to_string()).unwrap_or_default();
+        self.question = Some(Question::Path { purpose, text, reason, has_focus: false });
+    }
+
+    /// Draws the open question.
+    pub(super) fn question_ui(&mut self, ctx: &Context) {
+        let Some(mut question) = self.question.take() else { return };
+        let modal = Modal::new(egui::Id::unique("question")).show(ctx, |ui| {
+            ui.set_width(560.0_f32.min(ctx.content_rect().width() - 40.0).max(0.0));
+            self.ask_ui(&mut question, ui)
+        });
+        let answer = match modal.inner {
+            Answer::Open if modal.should_close() && !matches!(question, Question::Restore { .. }) => {
+                Answer::Close
+            }
+            answer => answer,
+        };
+        match answer {
+            Answer::Open => return self.question = Some(question),
+            Answer::Close => self.leave_after_save = false,
+            Answer::Send(command) => self.commands.send(command),
+            Answer::SaveAndLeave => {
+                self.leave_after_save = true;
+                match self.model_path.clone() {
+                    Some(path) => self.commands.send(Command::SaveModel(path)),
+                    None => self.ask_path(FilePurpose::SaveModel, None),
+                }
+            }
+            Answer::Discard => {
+                self.session = self.saved.clone();
+                self.leaving = true;
+            }
+            Answer::Restore => {
+                if let Question::Restore { path, mut document, whole } = question {
+                    if !whole && document.saved_model.is_none() {
+                        // What its file has is not known, so it counts as changed.
+                        document.saved_model = Some(self.saved.model());
+                    }
+                    self.take_document(&document_name(&document), *document, ctx);
+                    if whole {
+                        // The running window keeps it from now on.
+                        std::fs::remove_file(path).ok();
+                    }
+                }
+            }
+            Answer::StartAfresh => {
+                if let Question::Restore { path, .. } = question {
+                    self.say(format!("The session of before stays in {}.", path.display()));
+                }
+            }
+            Answer::Undo(count) => (0..count).for_each(|_| self.go(false)),
+            Answer::Redo(count) => (0..count).for_each(|_| self.go(true)),
+        }
+        ctx.request_repaint();
+    }
+
+    fn ask_ui(&self, question: &mut Question, ui: &mut Ui) -> Answer {
+        match question {
+            Question::Leave => self.leave_ui(ui),
+            Question::Preset { number, name, changes } => preset_ui(*number, name, changes, ui),
+            Question::Restore { document, whole, .. } => restore_ui(document, *whole, ui),
+            Question::Path { purpose, text, reason, has_focus } => {
+                path_ui(*purpose, text, reason.as_deref(), has_focus, &self.recent, ui)
+            }
+            Question::Steps => self.steps_ui(ui),
+        }
+    }
+
+    fn leave_ui(&self, ui: &mut Ui) -> Answer {
+        ui.heading("Save the model?");
+        ui.label(format!("“{}” has changes that are in no file.", self.session.name));
+        changes_ui(&self.saved.model().changes_to(&self.session.model()), ui);
+        answers_ui(
+            ui,
+            [
+                ("Save and close", "Save the model, then close the window", Answer::SaveAndLeave),
+                ("Discard and close", "Close the window; the changes are lost", Answer::Discard),
+                ("Cancel", "Go on", Answer::Close),
+            ],
+        )
+    }
+
+    fn steps_ui(&self, ui: &mut Ui) -> Answer {
+        ui.heading("Steps");
+        let mut answer = Answer::Open;
+        ScrollArea::vertical().max_height(LONGEST_TABLE).show(ui, |ui| {
+            let later: Vec<_> = self.undo.redoable().collect();
+            for (index, name) in later.iter().enumerate().rev() {
+                if ui
+                    .button(RichText::new(*name).weak())
+                    .on_hover_text("Go forth to behind this step")
+                    .clicked()
+                {
+                    answer = Answer::Redo(index + 1);
+                }
+            }
+            ui.label(RichText::new("now").strong());
+            for (index, name) in self.undo.undoable().enumerate() {
+                if ui.button(name).on_hover_text("Go back to before this step").clicked() {
+                    answer = Answer::Undo(index + 1);
+                }
+            }
+        });
+        match answers_ui(ui, [("Close", "Back to the page", Answer::Close)]) {
+            Answer::Open => answer,
+            closed => closed,
+        }
+    }
+}
+
+/// What a session is called in sentences.
+fn document_name(document: &Document) -> String {
+    document.model.as_ref().map_or_else(|| "before".to_owned(), |model| format!("“{}”", model.name))
+}
+
+fn answers_ui<const N: usize>(ui: &mut Ui, answers: [(&str, &str, Answer); N]) -> Answer {
+    ui.add_space(6.0);
+    let mut taken = Answer::Open;
+    ui.horizontal(|ui| {
+        for (name, help, answer) in answers {
+            if ui.button(name).on_hover_text(help).clicked() {
+                taken = answer;
+            }
+        }
+    });
+    taken
+}
+
+fn preset_ui(number: usize, name: &str, changes: &[Change], ui: &mut Ui) -> Answer {
+    ui.heading(format!("Load the preset “{name}”?"));
+    if changes.is_empty() {
+        ui.label("It is what the window shows already.");
+    } else {
+        ui.label(format!("{} values change. Undo brings those of now back.", changes.len()));
+        changes_ui(changes, ui);
+    }
+    answers_ui(
+        ui,
+        [
+            ("Load the preset", "Replace the model", Answer::Send(Command::TakePreset(number))),
+            ("Keep the model", "Leave the model as it is", Answer::Close),
+        ],
+    )
+}
+
+/// Old and new values, key by key.
+fn changes_ui(changes: &[Change], ui: &mut Ui) {
+    let value = |value: &Option<String>| value.clone().unwrap_or_else(|| "–".to_owned());
+    ScrollArea::vertical().max_height(LONGEST_TABLE).show(ui, |ui| {
+        Grid::new("changes").num_columns(3).striped(true).spacing([14.0, 3.0]).show(ui, |ui| {
+            for head in ["value", "now", "then"] {
+                hint_ui(ui, head);
+            }
+            ui.end_row();
+            for change in changes {
+                ui.label(words(&change.key));
+                ui.label(mono(value(&change.old)));
+                ui.label(mono(value(&change.new)).strong());
+                ui.end_row();
+            }
+        });
+    });
+}
+
+fn restore_ui(document: &Document, whole: bool, ui: &mut Ui) -> Answer {
+    ui.heading("flqr was not closed the last time");
+    ui.label(format!(
+        "The session of {} was kept, with changes that are in no file:",
+        document_name(document)
+    ));
+    if let (Some(saved), Some(model)) = (&document.saved_model, &document.model) {
+        changes_ui(&saved.changes_to(model), ui);
+    }
+    if !whole {
+        warning_ui(ui, "Not all of it could be read: the Log page says what.");
+    }
+    answers_ui(
+        ui,
+        [
+            ("Restore it", "Go on with the model as it was", Answer::Restore),
+            ("Start afresh", "Leave the kept session in its file", Answer::StartAfresh),
+        ],
+    )
+}
+
+fn path_ui(
+    purpose: FilePurpose,
+    text: &mut String,
+    reason: Option<&str>,
+    has_focus: &mut bool,
+    recent: &Recent,
+    ui: &mut Ui,
+) -> Answer {
+    ui.heading(title(purpose));
+    if let Some(reason) = reason {
+        warning_ui(ui, reason);
+    }
+    let field = TextEdit::singleline(text).hint_text("path of the file").desired_width(f32::INFINITY);
+    let field = ui.add(field).accessible_name("path of the file");
+    if !std::mem::replace(has_focus, true) {
+        field.request_focus();
+    }
+    let entered = field.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
+    for path in recent_of(purpose, recent) {
+        if ui.button(path.display().to_string()).on_hover_text("Used before").clicked() {
+            *text = path.display().to_string();
+            return taken(purpose, text);
+        }
+    }
+    let exists = saves(purpose) && !text.trim().is_empty() && Path::new(text.trim()).exists();
+    if exists {
+        warning_ui(ui, "There is such a file: it is replaced only after a question, or by a session.");
+    }
+    let answer = answers_ui(
+        ui,
+        [
+            ("OK", "Take this path", Answer::Send(Command::Say(String::new()))),
+            ("Cancel", "Go back", Answer::Close),
+        ],
+    );
+    match answer {
+        Answer::Send(_) => taken(purpose, text),
+        Answer::Open if entered => taken(purpose, text),
+        other => other,
+    }
+}
+
+fn taken(purpose: FilePurpose, text: &str) -> Answer {
+    match text.trim() {
+        "" => Answer::Open,
+        path if purpose == FilePurpose::SaveModel => Answer::Send(Command::SaveModel(path.into())),
+        path => Answer::Send(apply::chosen(purpose, path.into())),
+    }
+}
+
+fn saves(purpose: FilePurpose) -> bool {
+    matches!(purpose, FilePurpose::SaveModel | FilePurpose::SaveSession)
+}
+
+fn title(purpose: FilePurpose) -> &'static str {
+    match purpose {
+        FilePurpose::OpenModel => "Open a model",
+        FilePurpose::SaveModel => "Save the model as",
+        FilePurpose::OpenLog | FilePurpose::Refine(_) => "Open a log",
+        FilePurpose::OpenReplay => "Open a recording to replay",
+        FilePurpose::OpenSession => "Open a session",
+        FilePurpose::SaveSession => "Save the session as",
+        FilePurpose::SaveExperiment(_) => "Save the runs to",
+        FilePurpose::SaveRecording => "Record to",
+        FilePurpose::SaveFigure(_) => "Save the figure as",
+    }
+}
+
+fn recent_of(purpose: FilePurpose, recent: &Recent) -> &[PathBuf] {
+    match purpose {
+        FilePurpose::OpenModel => &recent.models,
+        FilePurpose::OpenLog | FilePurpose::Refine(_) => &recent.logs,
+        FilePurpose::OpenReplay => &recent.recordings,
+        FilePurpose::OpenSession => &recent.sessions,
+        _ => &[],
+    }
+}

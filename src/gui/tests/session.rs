@@ -1,0 +1,328 @@
+//! The session document: undo, what is asked before something is lost, and what is kept.
+
+#![expect(clippy::unwrap_used, reason = "helpers of tests, where a panic is the report")]
+
+mod common;
+
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use common::{ROBOT, SIZE, TempFile, Window, click, command, enter, open, options, state, until};
+use egui::{Key, Modifiers, ViewportCommand, ViewportEvent, ViewportId, vec2};
+use egui_kittest::kittest::Queryable;
+use flqr_core::model_file::Model;
+use flqr_gui::{Tab, WindowOptions};
+use serde_json::{Value, json};
+
+/// A folder that is removed with the test.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("flqr-session-{name}-{}", std::process::id()));
+        std::fs::remove_dir_all(&path).ok();
+        std::fs::create_dir_all(&path).unwrap();
+        Self(path)
+    }
+
+    fn options(&self) -> WindowOptions {
+        WindowOptions { state_folder: Some(self.0.clone()), ..options(Tab::Tune) }
+    }
+
+    fn running(&self) -> PathBuf {
+        self.0.join("running-0.flqr-session")
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        std::fs::remove_dir_all(&self.0).ok();
+    }
+}
+
+/// Frames until the file at `path` holds `text`.
+fn until_kept(window: &mut Window, path: &Path, text: &str) {
+    let start = Instant::now();
+    while !std::fs::read_to_string(path).is_ok_and(|kept| kept.contains(text)) {
+        assert!(start.elapsed() < Duration::from_secs(120), "{} has no {text}", path.display());
+        window.step();
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+fn keys(window: &mut Window, modifiers: Modifiers, key: Key) {
+    window.key_press_modifiers(modifiers, key);
+    window.run_steps(3);
+}
+
+fn pitch_weight(window: &Window) -> f64 {
+    state(window)["q_diagonal"][2].as_f64().unwrap()
+}
+
+#[test]
+fn a_drag_a_typed_value_and_a_choice_are_one_step_each() {
+    let mut window = open(options(Tab::Tune), SIZE);
+    let start = state(&window);
+    let slider = window.get_by_label("pitch weight slider").rect();
+    window.drag_at(slider.center());
+    window.step();
+    for distance in [8.0, 16.0, 24.0, 32.0] {
+        window.hover_at(slider.center() + vec2(distance, 0.0));
+        window.step();
+        assert_eq!(state(&window)["undo"], json!([]), "the button is still down");
+    }
+    window.drop_at(slider.center() + vec2(32.0, 0.0));
+    window.run_steps(2);
+    let dragged = pitch_weight(&window);
+    enter(&mut window, "velocity weight", "77");
+    click(&mut window, "LQR");
+    enter(&mut window, "left torque weight", "25");
+    let undo = state(&window)["undo"].clone();
+    let names: Vec<_> = undo.as_array().unwrap().iter().map(|name| name.as_str().unwrap()).collect();
+    assert_eq!(names[..3], ["torque weights 20 → 25", "controller LQR", "velocity weight 30 → 77"]);
+    assert!(names[3].starts_with("pitch weight 100 → ") && names.len() == 4, "{names:?}");
+
+    let gain_of_all = state(&window)["gain"].clone();
+    for left in (0..4).rev() {
+        keys(&mut window, Modifiers::COMMAND, Key::Z);
+        assert_eq!(state(&window)["undo"].as_array().map(Vec::len), Some(left));
+    }
+    let back = state(&window);
+    for part in ["q_diagonal", "r_diagonal", "controller", "gain", "unsaved_changes"] {
+        assert_eq!(back[part], start[part], "{part}");
+    }
+    keys(&mut window, Modifiers::COMMAND, Key::Z);
+    assert_eq!(state(&window)["message"], "Undo: there is nothing to undo.");
+    keys(&mut window, Modifiers::COMMAND, Key::Y);
+    assert_eq!(pitch_weight(&window), dragged);
+    for _ in 0..3 {
+        keys(&mut window, Modifiers::COMMAND | Modifiers::SHIFT, Key::Z);
+    }
+    assert_eq!(state(&window)["gain"], gain_of_all);
+
+    command(&mut window, "steps");
+    click(&mut window, "velocity weight 30 → 77");
+    assert_eq!(state(&window)["undo"].as_array().map(Vec::len), Some(1), "before that step");
+    assert_eq!(state(&window)["q_diagonal"][1], 30.0);
+}
+
+#[test]
+fn a_preset_says_what_changes_and_can_be_taken_back() {
+    let mut window = open(options(Tab::Tune), SIZE);
+    enter(&mut window, "pitch weight", "250");
+    let before = state(&window);
+    command(&mut window, "load the preset");
+    assert_eq!(state(&window)["question"], "preset");
+    window.get_by_label("name");
+    click(&mut window, "Keep the model");
+    assert_eq!(state(&window)["model"], before["model"]);
+    command(&mut window, "load the preset");
+    click(&mut window, "Load the preset");
+    let loaded = state(&window);
+    assert_ne!(loaded["model"], before["model"]);
+    assert_eq!(loaded["unsaved_changes"], false);
+    keys(&mut window, Modifiers::COMMAND, Key::Z);
+    let back = state(&window);
+    for part in ["model", "q_diagonal", "gain", "unsaved_changes"] {
+        assert_eq!(back[part], before[part], "{part}");
+    }
+    keys(&mut window, Modifiers::COMMAND, Key::Y);
+    assert_eq!(state(&window)["model"], loaded["model"]);
+}
+
+#[test]
+fn a_window_that_was_not_closed_is_offered_again_with_its_changes() {
+    let folder = Folder::new("crash");
+    {
+        let mut window = open(folder.options(), SIZE);
+        enter(&mut window, "pitch weight", "321");
+        command(&mut window, "Friction to the right");
+        until_kept(&mut window, &folder.running(), "321.0");
+        until_kept(&mut window, &folder.running(), "beside");
+    }
+    let mut window = open(folder.options(), SIZE);
+    until(&mut window, "the question", |s| s["question"] == "restore");
+    window.run_steps(2);
+    window.get_by_label("321");
+    assert_eq!(pitch_weight(&window), 100.0);
+    click(&mut window, "Restore it");
+    let restored = state(&window);
+    assert_eq!(restored["q_diagonal"][2], 321.0, "{restored:#}");
+    assert_eq!(restored["unsaved_changes"], true);
+    assert_eq!(restored["shown"].as_array().map(Vec::len), Some(2));
+    keys(&mut window, Modifiers::COMMAND, Key::Z);
+    assert_eq!(pitch_weight(&window), 100.0, "it is a step like any other");
+}
+
+#[test]
+fn starting_afresh_leaves_the_kept_session_in_its_file() {
+    let folder = Folder::new("afresh");
+    {
+        let mut window = open(folder.options(), SIZE);
+        enter(&mut window, "pitch weight", "322");
+        until_kept(&mut window, &folder.running(), "322.0");
+    }
+    let mut window = open(folder.options(), SIZE);
+    until(&mut window, "the question", |s| s["question"] == "restore");
+    window.run_steps(2);
+    click(&mut window, "Start afresh");
+    assert_eq!(pitch_weight(&window), 100.0);
+    let message = state(&window)["message"].as_str().unwrap().to_owned();
+    let kept = folder.0.join("left-0.flqr-session");
+    assert!(message.contains(kept.to_str().unwrap()), "{message}");
+    enter(&mut window, "pitch weight", "5");
+    command(&mut window, "open a session");
+    enter(&mut window, "path of the file", kept.to_str().unwrap());
+    until(&mut window, "opening", |s| s["q_diagonal"][2] == 322.0);
+}
+
+#[test]
+fn a_closed_window_leaves_its_layout_and_asks_nothing() {
+    let folder = Folder::new("closed");
+    {
+        let mut window = open(folder.options(), SIZE);
+        command(&mut window, "Robot to the bottom");
+        until_kept(&mut window, &folder.running(), "below");
+        window.state_mut().as_mut().unwrap().end();
+        assert!(!folder.running().exists());
+    }
+    let mut window = open(folder.options(), SIZE);
+    until(&mut window, "the layout", |s| s["shown"] == json!(["tune", "robot"]));
+    assert!(state(&window)["question"].is_null());
+}
+
+#[test]
+fn a_broken_session_file_never_stops_the_start() {
+    let folder = Folder::new("broken");
+    let whole = {
+        let mut window = open(folder.options(), SIZE);
+        enter(&mut window, "pitch weight", "323");
+        until_kept(&mut window, &folder.running(), "323.0");
+        std::fs::read_to_string(folder.running()).unwrap()
+    };
+    let newer = whole.replacen("\"version\": 1", "\"version\": 9", 1);
+    let not_a_number = whole.replacen("\"zoom\": 1.0", "\"zoom\": NaN", 1);
+    assert!(newer != whole && not_a_number != whole);
+    for (number, (text, said, asks)) in [
+        (&whole[..whole.len() / 2], "ends early", true),
+        (&newer, "newer flqr (version 9", true),
+        (&not_a_number, "“zoom” cannot be read", true),
+        ("{\"format", "no session file", false),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        std::fs::write(folder.running(), text).unwrap();
+        let mut window = open(folder.options(), SIZE);
+        let expected = |s: &Value| s["message"].as_str().is_some_and(|message| message.contains(said));
+        let found = until(&mut window, said, expected);
+        let kept = folder.0.join(format!("left-{number}.flqr-session"));
+        assert!(found["message"].as_str().unwrap().contains(kept.to_str().unwrap()), "{found:#}");
+        assert_eq!(std::fs::read_to_string(&kept).unwrap(), text, "the file is as it was");
+        assert_eq!(found["question"] == "restore", asks, "{said}: {found:#}");
+        if asks {
+            window.run_steps(2);
+            click(&mut window, "Restore it");
+            assert_eq!(pitch_weight(&window), 323.0, "{said}");
+        }
+        // The slot is free for the next one.
+        window.state_mut().as_mut().unwrap().end();
+    }
+}
+
+/// Asks the window to close, and says whether it would.
+fn closes(window: &mut Window) -> bool {
+    let viewport = window.input_mut().viewports.entry(ViewportId::ROOT).or_default();
+    viewport.events.push(ViewportEvent::Close);
+    window.step();
+    let cancelled = window.output().viewport_output[&ViewportId::ROOT].commands.clone();
+    window.run_steps(2);
+    !cancelled.contains(&ViewportCommand::CancelClose)
+}
+
+#[test]
+fn closing_asks_only_where_changes_would_be_lost() {
+    let file = TempFile::new("closing.toml", ROBOT);
+    let model_path = Some(file.0.clone());
+    let mut window = open(WindowOptions { model_path, ..options(Tab::Tune) }, SIZE);
+    assert!(closes(&mut window), "nothing is lost");
+    enter(&mut window, "pitch weight", "250");
+    assert!(!closes(&mut window));
+    assert_eq!(state(&window)["question"], "leave");
+    click(&mut window, "Cancel");
+    assert!(state(&window)["question"].is_null());
+    assert_eq!(pitch_weight(&window), 250.0);
+    assert!(!closes(&mut window));
+    click(&mut window, "Save and close");
+    until(&mut window, "saving", |s| s["leaving"] == true);
+    assert!(std::fs::read_to_string(&file.0).unwrap().contains("250"));
+    assert!(closes(&mut window));
+
+    let mut window = open(options(Tab::Tune), SIZE);
+    enter(&mut window, "pitch weight", "250");
+    assert!(!closes(&mut window));
+    click(&mut window, "Discard and close");
+    assert_eq!(state(&window)["leaving"], true);
+    assert!(closes(&mut window));
+}
+
+#[test]
+fn saving_keeps_the_comments_of_the_file() {
+    let written = format!("# weighed on 3 May\n{}", ROBOT.replace("[lqr]", "[lqr] # tuned by hand"));
+    let file = TempFile::new("comments.toml", &written);
+    let model = Model::from_toml(&written, "m").unwrap();
+    let mut window =
+        open(WindowOptions { model, model_path: Some(file.0.clone()), ..options(Tab::Tune) }, SIZE);
+    enter(&mut window, "pitch weight", "250");
+    keys(&mut window, Modifiers::COMMAND, Key::S);
+    until(&mut window, "saving", |s| s["unsaved_changes"] == false);
+    let saved = std::fs::read_to_string(&file.0).unwrap();
+    for part in ["# weighed on 3 May", "[lqr] # tuned by hand", "q_diagonal = [60.0, 30.0, 250.0, 5.0]"] {
+        assert!(saved.contains(part), "{part}: {saved}");
+    }
+}
+
+#[test]
+fn what_cannot_be_written_is_said_and_nothing_is_lost() {
+    let folder = Folder::new("full");
+    std::fs::write(folder.0.join("file"), "").unwrap();
+    let mut window = open(options(Tab::Tune), SIZE);
+    enter(&mut window, "pitch weight", "250");
+    for (name, text) in [("save the session as", "a.flqr-session"), ("save the model as", "a.toml")] {
+        command(&mut window, name);
+        let path = folder.0.join("file").join(text);
+        enter(&mut window, "path of the file", path.to_str().unwrap());
+        let said = until(&mut window, "the refusal", |s| {
+            s["message"].as_str().is_some_and(|message| message.contains(text))
+        });
+        assert!(said["message"].as_str().unwrap().contains("could not be saved"), "{said:#}");
+        assert_eq!((pitch_weight(&window), &said["unsaved_changes"]), (250.0, &json!(true)));
+    }
+}
+
+#[test]
+fn the_tour_is_seen_once_and_comes_back_when_asked_for() {
+    let file = TempFile::new("tour.json", "{\"version\": 1}");
+    let recent_file = Some(file.0.clone());
+    let begin = WindowOptions { tour: true, recent_file, ..options(Tab::Tune) };
+    let mut window = open(begin.clone(), SIZE);
+    until(&mut window, "the tour", |s| s["tour"] == 1);
+    window.run_steps(2);
+    for (step, tab) in [(2, "experiments"), (3, "friction"), (4, "robot"), (5, "tune")] {
+        click(&mut window, "Next step");
+        assert_eq!((&state(&window)["tour"], &state(&window)["tab"]), (&json!(step), &json!(tab)));
+    }
+    click(&mut window, "End the tour");
+    assert!(state(&window)["tour"].is_null());
+    until_kept(&mut window, &file.0, "\"tour_done\": true");
+    let mut window = open(begin, SIZE);
+    for _ in 0..50 {
+        window.step();
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    assert!(state(&window)["tour"].is_null(), "never again");
+    command(&mut window, "tour");
+    assert_eq!(state(&window)["tour"], 1);
+    click(&mut window, "Skip the tour");
+    assert!(state(&window)["tour"].is_null());
+}
