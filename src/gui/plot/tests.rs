@@ -134,12 +134,12 @@ fn cursors_move_by_samples_and_say_what_they_see() {
     }
     window.run_steps(3);
     assert_eq!(cursors(&window), [0.0, 1.099]);
-    assert_eq!(reading(&window, "pitch A: "), "0.000");
-    assert_eq!(reading(&window, "pitch B: "), "1.000");
+    assert_eq!(reading(&window, "pitch A: "), "0.0000");
+    assert_eq!(reading(&window, "pitch B: "), "1.0000");
     // 2 % of the change remains after ln(50)/20 s.
     assert_eq!(reading(&window, "pitch settling: "), "0.196 s");
     assert_eq!(reading(&window, "pitch overshoot: "), "0.0 %");
-    assert_eq!(reading(&window, "torque max: "), "1.000");
+    assert_eq!(reading(&window, "torque max: "), "1.0000");
     window.get_by_label("Δt 1.0990 s   1/Δt 0.9099 Hz");
     // A cursor is dragged with the pointer, too.
     let plot = window.get_by_label_contains("plot of torque").rect();
@@ -232,6 +232,16 @@ fn the_visible_range_is_saved_and_nothing_is_replaced_unasked() {
     }
     assert!(std::fs::read_to_string(folder.join("range.csv")).unwrap().starts_with("precious"));
     click(&mut window, "Replace it");
+    let replaced =
+        || std::fs::read_to_string(folder.join("range.csv")).is_ok_and(|text| text.starts_with("time_s"));
+    for _ in 0..500 {
+        window.step();
+        if replaced() {
+            break;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(2));
+    }
+    assert!(replaced(), "the file is replaced after the question");
     std::fs::remove_dir_all(&folder).unwrap();
 }
 
