@@ -86,8 +86,8 @@ struct Outcome {
     all_right: bool,
     unexplained: bool,
     ratio: f64,
-    /// Of each size that is known: whether it is in its interval, and by what share it is off.
-    sizes: Vec<(bool, f64)>,
+    /// Of each size that is known: whether it is in its interval, by what share it is off, and the interval's half width.
+    sizes: Vec<(bool, f64, f64)>,
 }
 
 /// What the command line asks for.
@@ -193,7 +193,7 @@ fn judge(family: &'static str, case: &Trial, noise: f64) -> Option<Outcome> {
     } else {
         'X'
     };
-    let sizes: Vec<(bool, f64)> =
+    let sizes: Vec<(bool, f64, f64)> =
         case.sizes.iter().filter_map(|&(id, key, truth)| size(&found, id, (key, truth))).collect();
     let line =
         format!("{mark} {family:9} {:28} {}\n      -> {}", case.name, case.faults, told(&found, ratio))
@@ -201,11 +201,12 @@ fn judge(family: &'static str, case: &Trial, noise: f64) -> Option<Outcome> {
     Some(Outcome { line, seconds, named, first_right, all_right, unexplained, ratio, sizes })
 }
 
-fn size(found: &Refinement, id: &str, (key, truth): (&str, f64)) -> Option<(bool, f64)> {
+fn size(found: &Refinement, id: &str, (key, truth): (&str, f64)) -> Option<(bool, f64, f64)> {
     let found = found.effects.iter().find(|found| found.effect.id() == id)?;
     let place = found.effect.parameters().iter().position(|(name, _)| name == key)?;
     let [low, high] = found.ci95[place]?;
-    Some(((low..=high).contains(&truth), found.effect.parameters()[place].1 / truth - 1.0))
+    let off = found.effect.parameters()[place].1 / truth - 1.0;
+    Some(((low..=high).contains(&truth), off, 0.5 * (high - low) / truth.abs()))
 }
 
 fn told(found: &Refinement, ratio: f64) -> String {
@@ -263,9 +264,9 @@ fn main() {
         row[5] += outcome.seconds;
         ratios.entry(family).or_default().push(outcome.ratio);
     }
-    let sizes: Vec<(bool, f64)> =
+    let sizes: Vec<(bool, f64, f64)> =
         outcomes.iter().flatten().flat_map(|outcome| outcome.sizes.clone()).collect();
-    let inside = sizes.iter().filter(|(inside, _)| *inside).count();
+    let inside = sizes.iter().filter(|(inside, ..)| *inside).count();
     println!("{inside} of {} intervals hold the true size", sizes.len());
     println!("family           runs  first right  all right  unexplained  named  error/floor  s");
     for (family, [runs, first, all, unexplained, named, seconds]) in table {

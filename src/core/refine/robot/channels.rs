@@ -22,8 +22,9 @@ pub(super) struct Channels {
     filters: [Filter; 2],
     /// Root mean square of c, r1 and r2 where there is nothing but noise.
     pub(super) floors: [f64; 3],
-    /// Rows of the trace that are used.
+    /// Rows of the trace that are used, and those that are held out.
     rows: Vec<usize>,
+    held_out: Vec<usize>,
 }
 
 #[derive(Clone)]
@@ -58,7 +59,12 @@ impl Channels {
         let floors = [0, 2, 3].map(|i: usize| spectra[i].correlation(0).sqrt());
         let filters = [0, 1].map(|i: usize| Filter::new(&spectra[i]));
         let rows = runs.iter().flat_map(|run| run.iter().copied().skip(ORDER)).collect();
-        Self { kappa, beta, filters, floors, rows }
+        let unseen = |run: super::trace::Run| {
+            let start = run.rows.start;
+            run.rows.filter(|&row| parts[row] == Part::HeldOut && row >= start + ORDER).collect::<Vec<_>>()
+        };
+        let held_out = trace.runs().into_iter().flat_map(unseen).collect();
+        Self { kappa, beta, filters, floors, rows, held_out }
     }
 
     /// Rows of the trace in their order; white columns hold those of c, then those of b.
@@ -71,12 +77,21 @@ impl Channels {
         pair[0].iter().zip(&pair[1]).map(|(r1, r2)| r1 - self.kappa * r2).collect()
     }
 
+    /// The white rows of a column where it is held out.
+    pub(super) fn unseen(&self, pair: &Pair) -> Vec<f64> {
+        self.whitened(pair, &self.held_out)
+    }
+
     /// The white rows of a column.
     pub(super) fn white(&self, pair: &Pair) -> Vec<f64> {
+        self.whitened(pair, &self.rows)
+    }
+
+    fn whitened(&self, pair: &Pair, rows: &[usize]) -> Vec<f64> {
         let mixed = mixed(pair, self.kappa, self.beta);
-        let mut white = Vec::with_capacity(2 * self.rows.len());
+        let mut white = Vec::with_capacity(2 * rows.len());
         for (column, filter) in mixed.iter().zip(&self.filters) {
-            white.extend(self.rows.iter().map(|&row| filter.at(column, row)));
+            white.extend(rows.iter().map(|&row| filter.at(column, row)));
         }
         white
     }

@@ -4,6 +4,7 @@ use crate::effects::Moment;
 use crate::refine::verdict::{Test, Unexplained};
 
 use super::channels::Channels;
+use super::lines;
 use super::search::{Fit, Search};
 use super::trace::{Pair, Part, Trace};
 
@@ -18,20 +19,39 @@ pub(super) fn structure(search: &Search<'_>, fit: &Fit) -> Option<Unexplained> {
     let left = search.left(&search.picks, &fit.judged.coefficients);
     let whole = fit.score / search.rows() as f64;
     let (worst, at_s) = worst_moment(search, &left);
-    if whole < WHOLE && worst < MOMENT {
+    let (hum, order) = (lines::hum(search, &left), lines::order(search, &left));
+    if whole < WHOLE && worst < MOMENT && hum.is_none() && order.is_none() {
         return None;
     }
     let mut shares = dependences(search, &left);
+    for (name, line) in [("time_s", &hum), ("motor_angle_rad", &order)] {
+        // What is slow has lines too.
+        if let Some((_, share)) = line
+            && whole < WHOLE
+        {
+            shares.insert(0, (name.to_owned(), *share));
+        }
+    }
     let brief = worst > MOMENT && whole < 1.6;
     if brief {
         shares.insert(0, ("time_s".to_owned(), 1.0 - 1.0 / whole.max(1.0)));
-        shares.dedup_by(|a, b| a.0 == b.0);
     }
+    let mut named: Vec<String> = Vec::new();
+    shares.retain(|(name, _)| {
+        let is_new = !named.contains(name);
+        named.push(name.clone());
+        is_new
+    });
     shares.truncate(3);
     let first = shares.first().map_or("nothing that was recorded", |(name, _)| name.as_str());
-    let place = if brief { format!(", most of it about {at_s:.1} s") } else { String::new() };
-    let description =
-        format!("{:.0} % more than noise is left{place}; it depends most on {first}", 100.0 * (whole - 1.0));
+    let place = match (brief, hum, order) {
+        (true, ..) => format!(", most of it about {at_s:.1} s"),
+        (_, _, Some((order, _))) => format!(", with a wave of order {order:.2} of the motor angle"),
+        (_, Some((hz, _)), _) => format!(", with a line at {hz:.1} Hz"),
+        _ => String::new(),
+    };
+    let more = 100.0 * (whole - 1.0).max(0.0);
+    let description = format!("{more:.0} % more than noise is left{place}; it depends most on {first}");
     let (depends_on, shares) = shares.into_iter().unzip();
     Some(Unexplained { depends_on, shares, description })
 }

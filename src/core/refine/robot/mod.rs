@@ -8,6 +8,7 @@
 //! declared numbers are free within their tolerances ([`nuisance`]); forward selection with swaps judges by left-out
 //! blocks ([`search`]). A second pass fills the gaps with the motion of the model that has the effects.
 
+mod bias;
 mod candidates;
 mod chance;
 mod channels;
@@ -15,18 +16,20 @@ mod found;
 mod health;
 mod kernel;
 mod leftover;
+mod lines;
 mod motion;
 mod nuisance;
 mod search;
 mod trace;
 mod tried;
+mod twin;
 mod uncertainty;
 
 use std::ops::ControlFlow;
 
-use crate::effects::Moment;
+use crate::effects::{Form, Moment};
 use crate::identify::quantile::student_t_975;
-use crate::model_file::{Model, RobotModel};
+use crate::model_file::{Model, RobotModel, Tolerances};
 use crate::record::{HealthFinding, Log, LogKind, Severity};
 
 use super::error::RefineError;
@@ -41,9 +44,13 @@ pub(super) use motion::{at_even_times, fresh_rows};
 use nuisance::{Nuisance, nuisances};
 use search::{Fit, Search, whitened};
 use trace::{Pair, Part, Trace};
+use twin::{Levels, Twin};
 
 /// Share of the structure that named effects must explain, so that they can be its cause.
 const EXPLAINED: f64 = 0.95;
+/// The same where no more than so much of the noise's power is left.
+const MOST_OF_IT: f64 = 0.5;
+const LITTLE: f64 = 0.1;
 
 /// Told the share of the work that is done; may end it.
 type Watch<'a> = &'a mut dyn FnMut(f64) -> ControlFlow<()>;
@@ -75,6 +82,16 @@ pub(super) fn residual(
     let errors = errors(&trace, &channels, &residual);
     let tests = leftover::tests(&trace, &channels, &residual);
     Ok(Residual { errors, tests, data_health })
+}
+
+/// Whether the logged torques act as late as the model says, and not as they are logged: a model file without a word of
+/// it says what is usual, and some logs hold what acts. What leaves less of r1 is taken.
+fn torques_are_late(robot: &RobotModel, logs: &[Readings]) -> bool {
+    let power = |of: fn(Readings, &RobotModel) -> Readings| {
+        let logs = logs.iter().map(|log| of(log.clone(), robot)).collect();
+        Trace::of_training(robot, logs).residual()[0].iter().map(|r| r * r).sum::<f64>()
+    };
+    robot.actuation.delay_s > 0.0 && power(Readings::acting) < power(Readings::without_offsets)
 }
 
 fn robot_of<'a>(model: &'a Model, logs: &[Log]) -> Result<&'a RobotModel, RefineError> {
@@ -112,7 +129,9 @@ pub(super) fn refine(
     if health::unfit(&data_health) {
         return Ok(unfit(model, data_health));
     }
-    let acting = |readings: Vec<Readings>| readings.into_iter().map(|r| r.acting(robot)).collect::<Vec<_>>();
+    let is_late = torques_are_late(robot, &training);
+    let of_log = |log: Readings| if is_late { log.acting(robot) } else { log.without_offsets(robot) };
+    let acting = |readings: Vec<Readings>| readings.into_iter().map(of_log).collect::<Vec<_>>();
     let (training, others) = (acting(training), acting(others));
     let biases = found::gyro_bias(&training);
     let mut trace = Trace::new(robot, training, others);
@@ -128,14 +147,22 @@ pub(super) fn refine(
         let target = trace.residual();
         let (mut free, mut tried) = (nuisances(&trace, &model.tolerance, &options.estimate), library(&trace));
         whitened(&mut tried, &mut free, &channels);
-        let by_chance =
-            || *chance.get_or_init(|| by_chance(&trace, &channels, &free, &target, model, options.seed));
+        let by_chance = || {
+            *chance.get_or_init(|| {
+                by_chance(&trace, &channels, &free, &target, (&model.tolerance, options.seed))
+            })
+        };
         let mut search = Search::new(&trace, &channels, &free, &tried, &target, &by_chance);
         search.run(&mut |share| report(watch, 0.1 + 0.45 * f64::from(pass) + 0.4 * share))?;
+        search.settle();
+        if pass == 1 {
+            search.merge_pushes();
+            search.confirm();
+        }
         let Some(fit) = search.fit(&search.picks) else { return Ok(unfit(model, data_health)) };
         let last = pass == 1 || search.picks.is_empty();
         if last {
-            return Ok(answer(model, &search, &fit, biases, data_health));
+            return Ok(answer(model, &search, &fit, (biases, options.seed), data_health));
         }
         let left = search.left_raw(&search.picks, &fit.judged.coefficients);
         let loads = trace.loads(&found::laws(&search, &fit));
@@ -145,19 +172,51 @@ pub(super) fn refine(
     Ok(unfit(model, data_health))
 }
 
+/// A clean robot that stands in for the recorded one, with its noise; none where it cannot be simulated.
+fn twin<'a>(
+    trace: &'a Trace<'_>,
+    known: &'a Tolerances,
+    channels: &Channels,
+    corrections: &[(&Nuisance, f64)],
+    seed: u64,
+) -> Option<(Twin<'a>, Levels)> {
+    let twin = Twin::new(trace, known, corrections)?;
+    let levels = twin.levels(channels.floors, seed)?;
+    Some((twin, levels))
+}
+
 /// The gain that clean robots reach by chance.
 fn by_chance(
     trace: &Trace<'_>,
     channels: &Channels,
     free: &[Nuisance],
     target: &Pair,
-    model: &Model,
-    seed: u64,
+    (known, seed): (&Tolerances, u64),
 ) -> f64 {
     let search = Search::new(trace, channels, free, &[], target, &|| 0.0);
     let Some(bare) = search.fit(&[]) else { return 0.0 };
     let corrections: Vec<(&Nuisance, f64)> = free.iter().zip(bare.judged.coefficients).collect();
-    chance::largest_gain(trace, &model.tolerance, channels, &corrections, seed)
+    twin(trace, known, channels, &corrections, seed)
+        .map_or(0.0, |(twin, levels)| chance::largest_gain(&twin, levels, seed))
+}
+
+/// Takes off what the chain itself adds to the sizes.
+fn unbiased(search: &Search<'_>, mut fit: Fit, known: &Tolerances, seed: u64) -> Fit {
+    let is_simulated = |pick: &candidates::Candidate| pick.form == Form::Law && !pick.kind.trial.brief;
+    if search.picks.is_empty() || !search.picks.iter().all(is_simulated) {
+        return fit;
+    }
+    let corrections: Vec<(&Nuisance, f64)> =
+        search.nuisances.iter().zip(fit.judged.coefficients.iter().copied()).collect();
+    let shifts = twin(search.trace, known, search.channels, &corrections, seed).and_then(|(twin, levels)| {
+        bias::shifts(search, &fit, &twin.with(found::laws(search, &fit))?, levels, seed)
+    });
+    let first = search.nuisances.len();
+    for (place, (shift, error)) in shifts.into_iter().flatten().enumerate() {
+        fit.judged.coefficients[first + place] -= shift;
+        fit.doubt[first + place] = error;
+    }
+    fit
 }
 
 fn check_names(nuisances: &[Nuisance], names: &[String]) -> Result<(), RefineError> {
@@ -191,7 +250,7 @@ fn answer(
     model: &Model,
     search: &Search<'_>,
     fit: &Fit,
-    biases: Vec<Found>,
+    (biases, seed): (Vec<Found>, u64),
     data_health: Vec<HealthFinding>,
 ) -> Refinement {
     let trace = search.trace;
@@ -200,10 +259,17 @@ fn answer(
     let rows = search.rows() as f64;
     let (lacking, leftover) = (bare.score / rows - 1.0, fit.score / rows - 1.0);
     let structure = leftover::structure(search, fit);
-    let explained = search.picks.is_empty() || structure.is_none() || 1.0 - leftover / lacking > EXPLAINED;
+    let share = 1.0 - leftover / lacking;
+    // A moment that is left beside what explains most of it does not make that doubtful.
+    let explained = search.picks.is_empty()
+        || structure.is_none()
+        || share > EXPLAINED
+        || leftover < LITTLE && share > MOST_OF_IT;
     let picks = if explained { search.picks.as_slice() } else { &[] };
     let used = if explained { fit } else { bare };
-    let mut effects = found::effects(search, picks, used);
+    let sized =
+        if picks.is_empty() { used.clone() } else { unbiased(search, used.clone(), &model.tolerance, seed) };
+    let mut effects = found::effects(search, picks, &sized);
     effects.extend(biases);
     let residual =
         |picks: &[candidates::Candidate], fit: &Fit| search.left_raw(picks, &fit.judged.coefficients);

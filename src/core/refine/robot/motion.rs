@@ -90,8 +90,13 @@ impl Readings {
 
     /// With what the model declares between controller and shaft, and in the IMU, taken account of: torques as they act,
     /// readings without their offsets.
-    pub(super) fn acting(mut self, robot: &RobotModel) -> Self {
-        let places = robot.actuation.delay_s / self.dt_s;
+    pub(super) fn acting(self, robot: &RobotModel) -> Self {
+        self.delayed(robot.actuation.delay_s).without_offsets(robot)
+    }
+
+    /// Torques that act later than they are logged.
+    fn delayed(mut self, delay_s: f64) -> Self {
+        let places = delay_s / self.dt_s;
         let (whole, share) = (places.floor() as usize, places.fract());
         for torque in &mut self.torque_nm {
             let at = |row: usize, back: usize| torque[row.saturating_sub(back)];
@@ -99,6 +104,11 @@ impl Readings {
                 .map(|row| (1.0 - share) * at(row, whole) + share * at(row, whole + 1))
                 .collect();
         }
+        self
+    }
+
+    /// Readings of the IMU as they would be without the offsets that the model declares.
+    pub(super) fn without_offsets(mut self, robot: &RobotModel) -> Self {
         let sensors = &robot.sensors;
         self.pitch_rad.iter_mut().for_each(|pitch| *pitch -= sensors.imu_mount_angle_rad);
         self.rate_rad_s.iter_mut().for_each(|rate| *rate -= sensors.gyro_bias_rad_s);

@@ -48,7 +48,8 @@ impl Uncertainty {
         for (shape, error) in free.iter().zip(errors.iter().skip(own)) {
             shapes[shape.pick][shape.place] = Some(*error);
         }
-        let sizes = (0..own).map(|i| errors[i].max(fit.judged.standard_error(i))).collect();
+        let sizes =
+            (0..own).map(|i| errors[i].max(fit.judged.standard_error(i)).hypot(fit.doubt[i])).collect();
         Self { sizes, shapes }
     }
 }

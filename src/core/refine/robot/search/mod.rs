@@ -48,6 +48,8 @@ pub(super) struct Fit {
     pub(super) score: f64,
     pub(super) blocks: Blocks,
     pub(super) members: Vec<Member>,
+    /// Standard error of each coefficient beyond that of the jackknife.
+    pub(super) doubt: Vec<f64>,
 }
 
 /// Everything to try, and its columns made white.
@@ -140,7 +142,7 @@ impl<'a> Search<'a> {
         if !is_brief.contains(&true) {
             let judged = blocks.judge(&members, 1.0)?;
             let score = judged.error() + self.price(&judged.coefficients);
-            return Some(Fit { judged, score, blocks, members });
+            return Some(Fit { judged, score, blocks, doubt: vec![0.0; members.len()], members });
         }
         // No other block tells of what was there for a moment only: it is taken off at its size in all rows.
         let all = blocks.fit(&members, 1.0)?;
@@ -167,7 +169,7 @@ impl<'a> Search<'a> {
         }
         judged.coefficients = all;
         judged.covariance = covariance;
-        Some(Fit { judged, score, blocks, members })
+        Some(Fit { judged, score, blocks, doubt: vec![0.0; members.len()], members })
     }
 
     /// Whether each column is of something that is there for a moment only.

@@ -6,12 +6,15 @@ use super::screen::Screen;
 use super::{Candidate, Fit, Search};
 
 /// Share of the error on left-out blocks that an effect must explain, and the least in units of the noise.
-const LEAST_SHARE: f64 = 0.002;
-const LEAST_GAIN: f64 = 16.0;
+const LEAST_SHARE: f64 = 0.0027;
+const LEAST_GAIN: f64 = 22.0;
 /// Standard errors above 0 of an effect's size, by the jackknife over blocks.
 pub(in crate::refine::robot) const LEAST_Z: f64 = 3.0;
 /// Least impulse of a push as a share of the weight, s: sticking that lets go looks like a smaller one.
 const LEAST_IMPULSE_S: f64 = 0.003;
+/// Time within which pushes are one, s, and the share of their gain that the strongest must have alone.
+const ONE_PUSH_S: f64 = 1.5;
+const MOST_OF_A_PUSH: f64 = 0.9;
 /// Most effects that are named.
 const MOST: usize = 6;
 /// Candidates whose shapes are refined and whose left-out error is worked out.
@@ -71,6 +74,54 @@ impl Search<'_> {
         let (gain, least) = ((before.score - with.score) / last.kind.trial.caution, self.least(before.score));
         let is_sure = last.kind.trial.brief || self.z(last, with) > LEAST_Z;
         gain > least && is_sure && (gain > DOUBT * least || gain > (self.by_chance)())
+    }
+
+    /// Drops picks that are not far beyond what chance does and do not lower the error on rows that no fit has seen.
+    pub(in crate::refine::robot) fn confirm(&mut self) {
+        let mut place = 0;
+        while place < self.picks.len() {
+            let mut others = self.picks.clone();
+            let pick = others.remove(place);
+            let (Some(with), Some(without)) = (self.fit(&self.picks), self.fit(&others)) else { return };
+            let gain = (without.score - with.score) / pick.kind.trial.caution;
+            let unseen = |picks: &[Candidate], fit: &Fit| {
+                let left = self.left_raw(picks, &fit.judged.coefficients);
+                self.channels.unseen(&left).iter().map(|v| v * v).sum::<f64>()
+            };
+            if !pick.kind.trial.brief
+                && gain < DOUBT * self.least(without.score)
+                && unseen(&self.picks, &with) >= unseen(&others, &without)
+            {
+                self.picks = others;
+            } else {
+                place += 1;
+            }
+        }
+    }
+
+    /// Of pushes next to each other keeps the strongest where the others only mend its shape, and none where one push
+    /// cannot be all of it.
+    pub(in crate::refine::robot) fn merge_pushes(&mut self) {
+        let is_brief = |pick: &Candidate| pick.kind.trial.brief;
+        let near = |a: &Candidate, b: &Candidate| (a.shape[0] - b.shape[0]).abs() < ONE_PUSH_S;
+        while let Some(first) = self.picks.iter().position(|pick| {
+            is_brief(pick)
+                && self.picks.iter().filter(|other| is_brief(other) && near(pick, other)).count() > 1
+        }) {
+            let center = self.picks[first].clone();
+            let (group, others): (Vec<_>, Vec<_>) =
+                self.picks.drain(..).partition(|pick| is_brief(pick) && near(pick, &center));
+            self.picks.clone_from(&others);
+            let score = |picks: &[Candidate]| self.fit(picks).map_or(f64::INFINITY, |fit| fit.score);
+            let with = |own: &[Candidate]| [others.as_slice(), own].concat();
+            let (none, all) = (score(&others), score(&with(&group)));
+            let best = group.iter().map(|pick| (score(&with(std::slice::from_ref(pick))), pick));
+            if let Some((alone, pick)) = best.min_by(|a, b| a.0.total_cmp(&b.0))
+                && none - alone > MOST_OF_A_PUSH * (none - all)
+            {
+                self.picks.push(pick.clone());
+            }
+        }
     }
 
     /// Standard errors of the last pick's size above 0.

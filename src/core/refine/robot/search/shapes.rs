@@ -5,10 +5,30 @@ use crate::effects::MachineKind;
 use super::screen::Screen;
 use super::{Candidate, Search};
 
+/// Times that sizes in shapes are moved.
+const SETTLING: usize = 3;
 /// Times that every parameter is moved.
 const ROUNDS: usize = 5;
 
 impl Search<'_> {
+    /// Moves the shapes of picks that have their size in them to where their amplitude is 1.
+    pub(in crate::refine::robot) fn settle(&mut self) {
+        for _ in 0..SETTLING {
+            if !self.picks.iter().any(Candidate::is_sized) {
+                return;
+            }
+            let Some(fit) = self.fit(&self.picks) else { return };
+            let moved = |(pick, first): (&Candidate, usize)| {
+                let mut shape = pick.shape.clone();
+                if pick.is_sized() {
+                    shape[0] *= fit.judged.coefficients[first];
+                }
+                self.moved(pick, shape).unwrap_or_else(|| pick.clone())
+            };
+            self.picks = self.placed(&self.picks).into_iter().map(moved).collect();
+        }
+    }
+
     /// Moves shape parameters one after another while the gain rises.
     pub(super) fn refine_shape(&self, screen: &Screen, candidate: &mut Candidate, mut gain: f64) -> f64 {
         let mut moves = candidate.moves(self.trace.machine.parameters.com_height_m);

@@ -31,7 +31,7 @@ impl Body {
     /// The model file of this robot.
     pub(crate) fn model_file(&self) -> String {
         let mut text = format!(
-            "name = \"undeclared\"\n[robot]\nbody_mass_kg = {}\nwheel_mass_kg = {}\nwheel_inertia_kg_m2 = {}\nwheel_radius_m = {}\ncom_height_m = {}\nbody_inertia_kg_m2 = {}\ngravity_m_s2 = {}\n",
+            "name = \"undeclared\"\n[actuation]\ndelay_s = 0.0\n[robot]\nbody_mass_kg = {}\nwheel_mass_kg = {}\nwheel_inertia_kg_m2 = {}\nwheel_radius_m = {}\ncom_height_m = {}\nbody_inertia_kg_m2 = {}\ngravity_m_s2 = {}\n",
             self.mass, self.wheel, self.wheel_inertia, self.radius, self.height, self.inertia, self.gravity
         );
         for (side, motor) in ["left", "right"].iter().zip(&self.motors) {
