@@ -76,6 +76,7 @@ impl ResidualStep {
         if self.in_time.as_ref().is_none_or(|(number, _)| *number != generation) {
             self.in_time = Some((generation, InTime::new(explorer, generation)));
         }
+        self.over.suggest(explorer, generation);
         let Some((_, in_time)) = &mut self.in_time else { return };
         let start = ui.cursor().top();
         section_ui(ui, "Measured against the model", |ui| {

@@ -37,13 +37,15 @@ struct Drawn {
 /// State of the plot over a variable.
 pub(super) struct Over {
     choice: Choice,
+    /// Of an answer, the variable on which the residual depends most.
+    suggested: Option<(u64, &'static str)>,
     drawn: Drawn,
 }
 
 impl Default for Over {
     fn default() -> Self {
         let choice = Choice { variable: String::new(), folded: true, held_out: true, band: Band::Error };
-        Self { choice, drawn: Drawn::default() }
+        Self { choice, suggested: None, drawn: Drawn::default() }
     }
 }
 
@@ -58,11 +60,28 @@ impl Over {
         name.clone_into(&mut self.choice.variable);
     }
 
-    /// The chosen variable, at first the one after time.
+    /// Looks for the variable on which the residual depends most, unless one was chosen.
+    pub(super) fn suggest(&mut self, explorer: &Explorer, generation: u64) {
+        if self.suggested.is_some_and(|(number, _)| number == generation) {
+            return;
+        }
+        let spread = |variable: &Variable| {
+            let folded: Vec<f64> = variable.values.iter().map(|value| value.rem_euclid(TAU)).collect();
+            let values = if goes_round(variable) { &folded } else { &variable.values };
+            let bins = binned(values, &explorer.before, MOST_BINS, Band::Error);
+            bins.iter().map(|bin| bin.mean * bin.mean).sum::<f64>() / bins.len().max(1) as f64
+        };
+        // Everything depends on time where nothing else explains it.
+        let others = explorer.variables.iter().skip(1).map(|variable| (spread(variable), variable.name));
+        let best = others.max_by(|a, b| a.0.total_cmp(&b.0));
+        self.suggested = best.map(|(_, name)| (generation, name));
+    }
+
+    /// The chosen variable, at first the suggested one.
     fn variable<'a>(&self, explorer: &'a Explorer) -> Option<&'a Variable> {
         explorer
             .variable(&self.choice.variable)
-            .or_else(|| explorer.variables.get(1))
+            .or_else(|| explorer.variable(self.suggested?.1))
             .or_else(|| explorer.variables.first())
     }
 
