@@ -146,7 +146,7 @@ pub(crate) enum Command {
     ShowSteps,
     StartTour,
     /// Copies the command that does in a terminal what the page shows.
-    CopyCommand,
+    CopyLine,
     LoadModel(PathBuf),
     /// Saves; a file other than the loaded one is replaced only after a question.
     SaveModel(PathBuf),

@@ -85,7 +85,7 @@ impl App {
                 self.tour = Some(Tour::default());
                 self.commands.send(Command::SelectTab(Tab::Tune));
             }
-            Command::CopyCommand => match self.command_line() {
+            Command::CopyLine => match self.command_line() {
                 Ok(line) => {
                     self.say(format!("Copied: {line}"));
                     ctx.copy_text(line);

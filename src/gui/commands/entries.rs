@@ -190,7 +190,7 @@ fn edit() -> Vec<Entry> {
             "Copy as a command",
             "What does in a terminal what this page shows",
             &[],
-            |s| if s.tab == Tab::Log { Err("this page does nothing") } else { Ok(Command::CopyCommand) },
+            |s| if s.tab == Tab::Log { Err("this page does nothing") } else { Ok(Command::CopyLine) },
         ),
         entry(menu, "steps", "Steps…", "All that can be undone, by name", &[], |_| Ok(Command::ShowSteps)),
         entry(
