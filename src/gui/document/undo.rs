@@ -196,7 +196,6 @@ pub(crate) fn words(key: &str) -> String {
 #[cfg(test)]
 mod tests {
     use flqr_core::control::ControllerKind;
-    use flqr_core::lqr::Weights;
     use flqr_core::model_file::presets;
 
     use super::*;
@@ -213,10 +212,9 @@ mod tests {
     fn with_weight(undo: &Undo, pitch: f64) -> Content {
         let mut content = undo.now().clone();
         let robot = content.session.robot_mut().unwrap();
-        let mut diagonal = robot.weights.unwrap().q.diagonal();
-        diagonal[2] = pitch;
-        let r = robot.weights.unwrap().r.diagonal();
-        robot.weights = Some(Weights::diagonal(diagonal.into(), r.into()));
+        let mut weights = robot.weights.unwrap();
+        weights.q[(2, 2)] = pitch;
+        robot.weights = Some(weights);
         content
     }
 

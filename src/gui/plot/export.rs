@@ -95,6 +95,9 @@ enum Saved {
     Exists,
 }
 
+/// Writes a figure.
+type SaveJob = Job<(), Result<Saved, String>>;
+
 /// The form and what it has started.
 #[derive(Default)]
 pub(super) struct Export {
@@ -103,7 +106,7 @@ pub(super) struct Export {
     path: String,
     size: Option<[f64; 2]>,
     shot: Option<(PathBuf, bool, Shot)>,
-    job: Option<(PathBuf, Job<(), Result<Saved, String>>)>,
+    job: Option<(PathBuf, SaveJob)>,
     problem: Option<String>,
     /// What is there already and was not replaced.
     existing: Option<PathBuf>,

@@ -132,8 +132,7 @@ impl Spectra {
                 let ends = visible.iter().filter_map(|(_, visible)| visible.statistics);
                 let ends: Vec<_> =
                     ends.map(|found| [found.min.max(found.max - DECADES), found.max]).collect();
-                let mut drawing = Drawing::default();
-                drawing.y_range = y_range(ends.into_iter(), 1.0);
+                let mut drawing = Drawing { y_range: y_range(ends.into_iter(), 1.0), ..Drawing::default() };
                 drawing.extras.logarithmic = true;
                 drawing.lines =
                     visible.into_iter().map(|(color, visible)| (color, visible.pieces.as_slice())).collect();
