@@ -15,6 +15,10 @@ use super::uncertainty::Uncertainty;
 const BIAS_RAD_S: f64 = 1e-3;
 const BIAS_Z: f64 = 5.0;
 
+/// Share of a value by which the method itself may be off: columns come from a motion that is filled in between the
+/// IMU's readings.
+const OF_THE_METHOD: f64 = 0.02;
+
 /// Laws of the picks with their coefficients, for the motion between the IMU's readings.
 pub(super) fn laws(search: &Search<'_>, fit: &Fit) -> Vec<(&'static EffectKind, Term, f64)> {
     let mut found = Vec::new();
@@ -92,10 +96,17 @@ pub(super) fn effects(search: &Search<'_>, picks: &[Candidate], fit: &Fit) -> Ve
         for &(member, first) in &members {
             let place = picks.iter().position(|pick| std::ptr::eq(pick, member)).unwrap_or(0);
             let own = first..first + member.white.len();
-            let own: Vec<(f64, f64)> =
-                own.map(|i| (fit.judged.coefficients[i], t * uncertainty.sizes[i])).collect();
-            let shapes: Vec<Option<f64>> =
-                uncertainty.shapes[place].iter().map(|error| error.map(|error| t * error)).collect();
+            let width = |value: f64, error: f64| (t * error).hypot(OF_THE_METHOD * value);
+            let own: Vec<(f64, f64)> = own
+                .map(|i| {
+                    (fit.judged.coefficients[i], width(fit.judged.coefficients[i], uncertainty.sizes[i]))
+                })
+                .collect();
+            let shapes: Vec<Option<f64>> = uncertainty.shapes[place]
+                .iter()
+                .zip(&member.shape)
+                .map(|(error, value)| error.map(|error| width(*value, error)))
+                .collect();
             let declared = as_declared(search, member, &own, &shapes);
             shape.extend(declared.shape);
             sizes.extend(declared.sizes);
@@ -141,7 +152,7 @@ pub(super) fn effects(search: &Search<'_>, picks: &[Candidate], fit: &Fit) -> Ve
 }
 
 /// Error on held-out rows, both equations measured by their noise.
-fn held_out_error(search: &Search<'_>, picks: &[Candidate], fit: &Fit) -> f64 {
+pub(super) fn held_out_error(search: &Search<'_>, picks: &[Candidate], fit: &Fit) -> f64 {
     let left = search.left_raw(picks, &fit.judged.coefficients);
     let parts = search.trace.parts();
     let floors = search.channels.floors;

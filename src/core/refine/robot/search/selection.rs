@@ -4,6 +4,7 @@ use crate::refine::error::RefineError;
 
 use super::screen::Screen;
 use super::{Candidate, Fit, Search};
+use crate::refine::robot::found::held_out_error;
 
 /// Share of the error on left-out blocks that an effect must explain, and the least in units of the noise.
 const LEAST_SHARE: f64 = 0.0027;
@@ -25,6 +26,8 @@ const LEAST_LOOK: f64 = 8.0;
 const WORTH_REFINING: f64 = 0.3;
 /// What a shape parameter and a unit of caution cost against a rival, in units of the noise.
 const HANDICAP: [f64; 2] = [3.0, 10.0];
+/// Factor on the error of held-out rows from which on a pick does harm.
+const MOST_HARM: f64 = 1.02;
 /// Gain in units of the least one up to which clean robots are asked what chance does.
 const DOUBT: f64 = 3.0;
 
@@ -76,7 +79,8 @@ impl Search<'_> {
         gain > least && is_sure && (gain > DOUBT * least || gain > (self.by_chance)())
     }
 
-    /// Drops picks that are not far beyond what chance does and do not lower the error on rows that no fit has seen.
+    /// Drops picks that are not far beyond what chance does and do not lower the error on rows that no fit has seen, and
+    /// those that raise the error on held-out rows.
     pub(in crate::refine::robot) fn confirm(&mut self) {
         let mut place = 0;
         while place < self.picks.len() {
@@ -88,10 +92,11 @@ impl Search<'_> {
                 let left = self.left_raw(picks, &fit.judged.coefficients);
                 self.channels.unseen(&left).iter().map(|v| v * v).sum::<f64>()
             };
-            if !pick.kind.trial.brief
-                && gain < DOUBT * self.least(without.score)
-                && unseen(&self.picks, &with) >= unseen(&others, &without)
-            {
+            let is_weak = gain < DOUBT * self.least(without.score)
+                && unseen(&self.picks, &with) >= unseen(&others, &without);
+            let harms = held_out_error(self, &self.picks, &with)
+                > MOST_HARM * held_out_error(self, &others, &without);
+            if !pick.kind.trial.brief && (is_weak || harms) {
                 self.picks = others;
             } else {
                 place += 1;
