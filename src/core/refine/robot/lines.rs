@@ -18,8 +18,10 @@ const LAST_ORDER: f64 = 24.0;
 const APART: f64 = 0.5;
 /// Place of the first order: slow things look like lower ones.
 const FIRST_ORDER: usize = 8;
-/// Power in units of the noise at which an order is a line.
+/// Power in units of the noise at which an order is a line, and the share of the whole that one must have beside no
+/// effect: friction that sticks at the same places of a tone leaves fainter ones on clean robots.
 const LEAST_POWER: f64 = 40.0;
+const LEAST_SHARE: f64 = 0.01;
 
 /// The strongest line in the spectrum of a residual: its frequency, Hz, and its share of the power.
 pub(super) fn hum(search: &Search<'_>, left: &[f64]) -> Option<(f64, f64)> {
@@ -84,5 +86,6 @@ pub(super) fn order(search: &Search<'_>, left: &[f64]) -> Option<(f64, f64)> {
         (order, of(&cos) + of(&sin))
     };
     let best = (FIRST_ORDER..=count).map(power).max_by(|a, b| a.1.total_cmp(&b.1))?;
-    (best.1 > LEAST_POWER).then_some((best.0, best.1 / total))
+    let least = if search.picks.is_empty() { LEAST_SHARE * total } else { 0.0 };
+    (best.1 > LEAST_POWER.max(least)).then_some((best.0, best.1 / total))
 }

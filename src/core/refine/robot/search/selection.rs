@@ -76,7 +76,9 @@ impl Search<'_> {
         }
         let (gain, least) = ((before.score - with.score) / last.kind.trial.caution, self.least(before.score));
         let is_sure = last.kind.trial.brief || self.z(last, with) > LEAST_Z;
-        gain > least && is_sure && (gain > DOUBT * least || gain > (self.by_chance)())
+        // What sticking mimics on clean robots too is in doubt however large it is.
+        let is_plain = last.kind.trial.caution <= 1.0;
+        gain > least && is_sure && (is_plain && gain > DOUBT * least || gain > (self.by_chance)())
     }
 
     /// Drops picks that are not far beyond what chance does and do not lower the error on rows that no fit has seen, and

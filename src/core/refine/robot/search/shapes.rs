@@ -1,6 +1,6 @@
 //! Shapes of candidates, refined.
 
-use crate::effects::MachineKind;
+use crate::effects::{Grid, MachineKind, Parameter, Step};
 
 use super::screen::Screen;
 use super::{Candidate, Search};
@@ -9,6 +9,17 @@ use super::{Candidate, Search};
 const SETTLING: usize = 3;
 /// Times that every parameter is moved.
 const ROUNDS: usize = 5;
+
+/// The least value of a shape that a search goes down to: a step below where it begins. What is finer, a log of a robot
+/// does not resolve, and friction next to rest is free anyhow.
+fn finest(parameter: &Parameter) -> f64 {
+    match (parameter.grid, parameter.step) {
+        (Grid::Values(values), Step::Factor(factor)) if !parameter.sized => {
+            values.iter().copied().fold(f64::INFINITY, f64::min) / factor
+        }
+        _ => f64::NEG_INFINITY,
+    }
+}
 
 impl Search<'_> {
     /// Moves the shapes of picks that have their size in them to where their amplitude is 1.
@@ -61,7 +72,7 @@ impl Search<'_> {
     ) -> Option<Candidate> {
         let possible = candidate.kind.shapes().zip(&shape).all(|(parameter, value)| {
             let [low, high] = parameter.range(MachineKind::Robot);
-            (low..=high).contains(value)
+            (low.max(finest(parameter))..=high).contains(value)
         });
         if !possible {
             return None;
