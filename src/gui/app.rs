@@ -170,7 +170,6 @@ impl App {
             frame_cpu_s: None,
         };
         app.designer.update(&app.session);
-        app.designer.note_drag_start();
         app.reset_live();
         app.say_loaded();
         if let Some(log) = options.log {
@@ -253,6 +252,7 @@ impl App {
         let context = ViewContext {
             session: &self.session,
             model_path: self.model_path.as_deref().filter(|_| self.session == self.saved),
+            saved: &self.saved,
             designer: &self.designer,
             history: if self.source == Source::Simulated { &self.history } else { &self.link.history },
             live: &self.live.status,
@@ -515,6 +515,7 @@ impl App {
                 "lost_samples": self.live.status.lost_samples,
                 "displacement_mm": self.history.last(Channel::Displacement).map(|x_m| (1e3 * x_m).round()),
             },
+            "tune_tab": self.tune.snapshot(&self.designer),
             "friction_tab": self.friction.snapshot(),
             "refine_tab": self.refine.snapshot(&self.session),
             "experiments_tab": self.experiments.snapshot(),

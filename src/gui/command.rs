@@ -110,13 +110,15 @@ pub(crate) enum Command {
     Stop,
     SelectSource(Source),
     SetWeights(Weights),
-    /// A drag of a weight begins: the gains of now are the ones to compare with.
+    /// A drag of a weight, or typing one, begins,
     BeginWeightDrag,
-    /// Keeps the gains of now as A, whatever is dragged later.
+    /// and ends: what lies between is one change.
+    EndWeightDrag,
+    /// Makes the other design of the comparison the one of now.
     KeepReference,
-    /// The comparison follows the start of each drag again.
-    ReleaseReference,
-    /// Goes back to the weights of A.
+    /// The other design of the comparison comes into force, and the one of now is the other.
+    SwapReference,
+    /// Goes back to the weights of the other design.
     RestoreReference,
     /// Goes back to the weights of the loaded model.
     ResetWeights,

@@ -15,6 +15,8 @@ pub(crate) struct ViewContext<'a> {
     pub(crate) session: &'a Session,
     /// The file that holds the very model of the session.
     pub(crate) model_path: Option<&'a Path>,
+    /// As it was loaded or saved last.
+    pub(crate) saved: &'a Session,
     pub(crate) designer: &'a Designer,
     /// Of the chosen source.
     pub(crate) history: &'a History,

@@ -24,6 +24,31 @@ pub(crate) struct Designed {
     pub(crate) margins: Margins,
 }
 
+/// The two designs that are compared. One is in force and edited, the other waits.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Slot {
+    /// At the start, the design of the loaded model.
+    A,
+    #[default]
+    B,
+}
+
+impl Slot {
+    pub(crate) fn other(self) -> Self {
+        match self {
+            Self::A => Self::B,
+            Self::B => Self::A,
+        }
+    }
+
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::A => "A",
+            Self::B => "B",
+        }
+    }
+}
+
 /// The design in force, the last problem, and the design to compare with.
 #[derive(Default)]
 pub(crate) struct Designer {
@@ -34,10 +59,10 @@ pub(crate) struct Designer {
     pub(crate) problem: Option<String>,
     /// Duration of the last solve, s.
     pub(crate) solve_s: f64,
-    /// Design A of the comparison.
+    /// The other design, for the same robot.
     pub(crate) reference: Option<Designed>,
-    /// Whether the user pinned A; otherwise it is the design at the start of the last drag.
-    pub(crate) reference_is_kept: bool,
+    /// Which of the two is in force.
+    pub(crate) active: Slot,
     /// Number of designs so far.
     pub(crate) count: u64,
 }
@@ -54,7 +79,22 @@ impl Designer {
             return false;
         }
         self.tried = Some(input);
-        self.solve(input)
+        let changed = self.solve(input);
+        self.follow_robot(input.0, input.2);
+        changed
+    }
+
+    /// The other design is one for the robot of now; at the start both are the same.
+    fn follow_robot(&mut self, parameters: RobotParameters, timing: SampledLoop) {
+        let Some(reference) = self.reference else {
+            self.reference = self.in_force;
+            return;
+        };
+        if (reference.parameters, reference.timing) != (parameters, timing) {
+            let again = design(&parameters.linear_model(), &reference.weights)
+                .map(|design| Designed::new(parameters, reference.weights, timing, design));
+            self.reference = again.ok().or(self.reference);
+        }
     }
 
     fn solve(&mut self, (parameters, weights, timing): (RobotParameters, Weights, SampledLoop)) -> bool {
@@ -65,8 +105,7 @@ impl Designer {
         match result {
             Ok(design) => {
                 self.problem = None;
-                let margins = margins(&model, &design.gain, &timing);
-                self.in_force = Some(Designed { parameters, weights, design, timing, margins });
+                self.in_force = Some(Designed::new(parameters, weights, timing, design));
                 true
             }
             Err(error) => {
@@ -76,11 +115,30 @@ impl Designer {
         }
     }
 
-    /// Takes the design in force as A unless the user pinned another.
-    pub(crate) fn note_drag_start(&mut self) {
-        if !self.reference_is_kept {
-            self.reference = self.in_force;
-        }
+    /// The other design, where it differs from the one in force.
+    pub(crate) fn different(&self) -> Option<Designed> {
+        let in_force = self.in_force?;
+        self.reference.filter(|reference| reference.design != in_force.design)
+    }
+
+    /// Makes the other design the same as the one in force.
+    pub(crate) fn keep(&mut self) {
+        self.reference = self.in_force;
+    }
+
+    /// Changes places; gives the weights that come into force.
+    pub(crate) fn swap(&mut self) -> Option<Weights> {
+        let (reference, in_force) = (self.reference?, self.in_force?);
+        self.reference = Some(in_force);
+        self.active = self.active.other();
+        Some(reference.weights)
+    }
+}
+
+impl Designed {
+    fn new(parameters: RobotParameters, weights: Weights, timing: SampledLoop, design: LqrDesign) -> Self {
+        let margins = margins(&parameters.linear_model(), &design.gain, &timing);
+        Self { parameters, weights, design, timing, margins }
     }
 }
 

@@ -19,9 +19,14 @@ pub(crate) struct Reporter<P> {
 }
 
 impl<P> Reporter<P> {
+    /// Whether the window no longer wants the result.
+    pub(crate) fn is_cancelled(&self) -> bool {
+        self.cancel.load(Ordering::Relaxed)
+    }
+
     /// Hands progress to the window; `Break` when the job has been cancelled.
     pub(crate) fn progress(&self, progress: P) -> ControlFlow<()> {
-        if self.cancel.load(Ordering::Relaxed) {
+        if self.is_cancelled() {
             return ControlFlow::Break(());
         }
         if self.sender.try_send(progress).is_ok() {

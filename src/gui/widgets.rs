@@ -82,6 +82,20 @@ pub(crate) fn shown(value: f64, digits: usize) -> String {
     format!("{value:.decimals$}").replace('-', "−")
 }
 
+/// From one number to another: in percent, or nothing where there is no ratio.
+pub(crate) fn change(a: f64, b: f64) -> String {
+    let percent = 100.0 * (b / a - 1.0);
+    if !percent.is_finite() {
+        return "–".to_owned();
+    }
+    let sign = if percent > 0.0 { "+" } else { "" };
+    if percent.abs() >= 1000.0 {
+        format!("×{}", shown(b / a, 3))
+    } else {
+        format!("{sign}{} %", shown(percent, 3))
+    }
+}
+
 /// Monospace text, for columns of numbers.
 pub(crate) fn mono(text: impl Into<String>) -> RichText {
     RichText::new(text).monospace()
@@ -116,6 +130,15 @@ mod tests {
         assert_eq!(shown(-12.3456, 4), "−12.35");
         assert_eq!(shown(0.0, 3), "0.00");
         assert_eq!(shown(2.1e-15, 2), "2.1e−15");
+    }
+
+    #[test]
+    fn a_change_is_told_in_percent_or_as_a_factor() {
+        for (a, b, text) in
+            [(2.0, 3.0, "+50.0 %"), (-2.0, -1.0, "−50.0 %"), (1.0, 40.0, "×40.0"), (0.0, 1.0, "–")]
+        {
+            assert_eq!(change(a, b), text);
+        }
     }
 
     #[test]

@@ -111,6 +111,11 @@ impl SampledLoop {
         }
     }
 
+    /// Whether the eigenvalues of the loop are computed, in a time that a frame has.
+    pub(super) fn is_analysed(&self) -> bool {
+        self.is_within_reach() && self.delay_s <= LONGEST_QUEUE * self.tick_s
+    }
+
     fn is_within_reach(&self) -> bool {
         let ticks = |time_s: f64| time_s / self.tick_s;
         self.tick_s > 0.0

@@ -167,9 +167,35 @@ impl SampledSystem {
         std::f64::consts::TAU / (self.imu_period as f64 * self.tick_s)
     }
 
+    /// Ticks from one IMU sample to the next.
+    pub(super) fn imu_period(&self) -> usize {
+        self.imu_period
+    }
+
+    /// Age of an IMU sample when it arrives, ticks.
+    pub(super) fn imu_latency(&self) -> usize {
+        self.imu_latency
+    }
+
+    /// Whole ticks from a command to its acting.
+    pub(super) fn delay(&self) -> usize {
+        self.delay
+    }
+
+    /// The plant a tick later, where `now` is the command of a whole delay ago and `before` the one of a tick
+    /// earlier, which acts on while the delay's fraction lasts.
+    pub(super) fn next(&self, x: &Vector4<f64>, now: f64, before: f64) -> Vector4<f64> {
+        x + (self.plant * x + self.input[0] * now + self.input[1] * before) * self.tick_s
+    }
+
     /// Largest modulus of the eigenvalues of one IMU period, with `factor` in the loop: below 1 where the loop
     /// is stable. `None` where a number is not finite.
     pub(super) fn spectral_radius(&self, factor: f64) -> Option<f64> {
+        Some(self.poles(factor)?.iter().fold(0.0, |largest: f64, pole| largest.max(pole.norm())))
+    }
+
+    /// Eigenvalues of one IMU period, with `factor` in the loop. `None` where a number is not finite.
+    pub(super) fn poles(&self, factor: f64) -> Option<Vec<Complex<f64>>> {
         let size = self.states();
         let mut columns = Vec::with_capacity(size);
         for column in 0..size {
@@ -180,7 +206,7 @@ impl SampledSystem {
         }
         let mut poles = vec![Complex::default(); size];
         eigenvalues(SquareN::from_fn(size, |row, column| columns[column][row]), &mut poles)?;
-        Some(poles.iter().fold(0.0, |largest: f64, pole| largest.max(pole.norm())))
+        Some(poles)
     }
 
     /// The plant's four, the commands under way, newest first, and the pitch samples not in use any more or yet.
@@ -204,7 +230,7 @@ impl SampledSystem {
             under_way.rotate_right(1);
             under_way[0] = command;
             let now = under_way[self.delay];
-            x += (self.plant * x + self.input[0] * now + self.input[1] * before) * self.tick_s;
+            x = self.next(&x, now, before);
         }
         plant.copy_from_slice(x.as_slice());
         if let Some(oldest) = samples.last_mut() {

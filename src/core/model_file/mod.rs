@@ -7,6 +7,7 @@
 mod axis_schema;
 mod changes;
 mod effects_schema;
+mod entries;
 mod keep;
 pub mod presets;
 mod refusal;
@@ -25,6 +26,7 @@ use crate::robot::{
 };
 use axis_schema::AxisFile;
 pub use changes::Change;
+pub use entries::Entry;
 use refusal::Refusal;
 use robot_schema::RobotFile;
 pub use tolerance::Tolerances;

@@ -14,6 +14,7 @@
 //! - A log in which every second row would be dropped, or time fails in more than one row of a hundred, is
 //!   refused. A repeated header (recordings appended to one another) is such a dropped row.
 
+mod align;
 mod cells;
 mod error;
 mod health;
@@ -31,6 +32,7 @@ mod text;
 mod time;
 mod write;
 
+pub use align::{Alignment, Signal, best_alignment, first_crossing_s};
 pub use error::{LineProblem, LogError};
 pub use health::{HealthFinding, Severity, data_health};
 pub use map::{ColumnMap, MapError, Mapping};

@@ -15,6 +15,7 @@ mod motors;
 pub(crate) mod noise;
 mod planar;
 mod plant;
+mod recovery;
 mod response;
 mod robot;
 mod scenario;
@@ -33,6 +34,7 @@ pub use ground::Ground;
 pub(crate) use noise::Noise;
 pub use planar::{Forcing, PlanarPlant, Trial, TrialOutcome, advance_batch, monte_carlo};
 pub use plant::{Followed, Plant, Pose};
+pub use recovery::{Recovery, largest_pitch, recovery};
 pub use response::predicted_response;
 pub use robot::SimulatedRobot;
 pub use scenario::{Scenario, UnknownScenario};
@@ -46,5 +48,7 @@ pub use tracking::StepResponse;
 mod bench_tests;
 #[cfg(test)]
 mod experiment_tests;
+#[cfg(test)]
+mod recovery_tests;
 #[cfg(test)]
 mod tests;

@@ -103,12 +103,9 @@ impl App {
                     robot.weights = Some(weights);
                 }
             }
-            Command::BeginWeightDrag => self.designer.note_drag_start(),
-            Command::KeepReference => {
-                self.designer.reference = self.designer.in_force;
-                self.designer.reference_is_kept = true;
-            }
-            Command::ReleaseReference => self.designer.reference_is_kept = false,
+            Command::BeginWeightDrag | Command::EndWeightDrag => {}
+            Command::KeepReference => self.designer.keep(),
+            Command::SwapReference => self.swap_reference(),
             Command::RestoreReference => self.restore_reference(),
             Command::ResetWeights => self.reset_weights(),
             Command::SetParameters(parameters) => {
@@ -278,11 +275,18 @@ impl App {
         if let Some(robot) = self.session.robot_mut() {
             robot.weights = Some(reference.weights);
         }
-        self.say("The weights of A are back.");
+        self.say(format!("The weights of {} are in force.", self.designer.active.other().name()));
+    }
+
+    fn swap_reference(&mut self) {
+        let Some(weights) = self.designer.swap() else { return };
+        if let Some(robot) = self.session.robot_mut() {
+            robot.weights = Some(weights);
+        }
+        self.say(format!("{} is in force.", self.designer.active.name()));
     }
 
     fn reset_weights(&mut self) {
-        self.designer.note_drag_start();
         let weights = self.saved.robot().and_then(|robot| robot.weights);
         if let Some(robot) = self.session.robot_mut() {
             robot.weights = weights;

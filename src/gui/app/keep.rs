@@ -88,7 +88,6 @@ impl App {
         self.tune.load(&self.session, self.model_path.as_deref());
         self.designer = crate::design::Designer::default();
         self.designer.update(&self.session);
-        self.designer.note_drag_start();
         self.reset_live();
     }
 

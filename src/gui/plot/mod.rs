@@ -18,7 +18,7 @@ mod tests;
 mod unit;
 mod view;
 
-pub(crate) use axes::Axes;
+pub(crate) use axes::{Axes, Y_AXIS_WIDTH};
 pub use column::{CHUNK, TimeColumn, ValueColumn};
 pub use decimate::{Curve, Data, DecimationCache, RangeStatistics, Visible, decimate};
 pub use export::{FigureFile, FigureKind};

@@ -4,7 +4,7 @@ use egui::Ui;
 use flqr_core::lqr::Weights;
 use nalgebra::SMatrix;
 
-use crate::command::Command;
+use super::weights::note_edit;
 use crate::context::ViewContext;
 use crate::widgets::{hint_ui, number_ui};
 
@@ -49,8 +49,6 @@ fn symmetric_ui<const N: usize>(
 fn entry_ui(context: &ViewContext<'_>, ui: &mut Ui, value: &mut f64, name: &str) -> bool {
     let before = *value;
     let field = number_ui(ui, value, name, 46.0).on_hover_text(name);
-    if field.drag_started() || field.gained_focus() {
-        context.commands.send(Command::BeginWeightDrag);
-    }
+    note_edit(context, &field);
     *value != before
 }

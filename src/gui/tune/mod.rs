@@ -1,11 +1,16 @@
 //! The *Tune* page: weights and gains at the left, the live robot in the middle, the model at the right.
 
+mod compare;
 mod gains;
 mod live_plots;
+mod margins;
 mod matrices;
 mod model;
 mod parameters;
+mod pole_plane;
 mod predicted;
+mod trials;
+mod verdict;
 mod weights;
 
 use std::path::{Path, PathBuf};
@@ -14,6 +19,7 @@ use egui::{CentralPanel, Frame, Margin, Panel, ScrollArea, Ui};
 
 use crate::command::{Command, FilePurpose, Source};
 use crate::context::ViewContext;
+use crate::design::Designer;
 use crate::session::Session;
 use crate::tab::Tab;
 use crate::widgets::hint_ui;
@@ -21,6 +27,7 @@ use live_plots::LivePlots;
 use model::ModelFiles;
 use parameters::ParameterEditor;
 use predicted::Predicted;
+use trials::Trials;
 use weights::WeightEditor;
 
 /// State of the page that is no part of the session.
@@ -28,6 +35,7 @@ pub(crate) struct TuneTab {
     weights: WeightEditor,
     plots: LivePlots,
     predicted: Predicted,
+    trials: Trials,
     files: ModelFiles,
     parameters: ParameterEditor,
 }
@@ -38,6 +46,7 @@ impl TuneTab {
             weights: WeightEditor::default(),
             plots: LivePlots::new(),
             predicted: Predicted::default(),
+            trials: Trials::default(),
             files: ModelFiles::new(path),
             parameters: ParameterEditor::new(session),
         }
@@ -80,6 +89,30 @@ impl TuneTab {
         self.files = ModelFiles::new(Some(path));
     }
 
+    /// What the page shows of a design, as `--state-out` writes it.
+    pub(crate) fn snapshot(&self, designer: &Designer) -> serde_json::Value {
+        serde_json::json!({
+            "design": designer.active.name(),
+            "other_design": designer.reference.map(|designed| designed.weights.q.diagonal().as_slice().to_vec()),
+            "margins": designer.in_force.as_ref().map(margins::snapshot),
+            "trials": self.trials.snapshot(),
+        })
+    }
+
+    /// The left side, from the weights to what follows from them.
+    fn design_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
+        compare::slots_ui(context, ui);
+        self.weights.ui(context, ui);
+        gains::ui(context, ui);
+        let peaks_nm = self.trials.shown_peaks_nm(context);
+        compare::differences_ui(context, peaks_nm, ui);
+        if let Some(designed) = &context.designer.in_force {
+            margins::ui(designed, self.predicted.poles(context, &self.trials), ui);
+        }
+        self.trials.ui(context, ui);
+        gains::feedforward_ui(context, ui);
+    }
+
     pub(crate) fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
         let side = Frame::side_top_panel(ui.style()).inner_margin(Margin::symmetric(10, 6));
         Panel::right("model").frame(side).resizable(true).default_size(252.0).size_range(220.0..=420.0).show(
@@ -98,22 +131,20 @@ impl TuneTab {
         Panel::left("weights")
             .frame(side)
             .resizable(true)
-            .default_size(338.0)
-            .size_range(300.0..=460.0)
+            .default_size(366.0)
+            .size_range(350.0..=480.0)
             .show(ui, |ui| {
                 ScrollArea::vertical().show(ui, |ui| {
-                    self.weights.ui(context, ui);
-                    gains::ui(context, ui);
-                    gains::feedforward_ui(context, ui);
+                    self.design_ui(context, ui);
                 });
             });
         let bottom = Frame::central_panel(ui.style()).inner_margin(Margin::symmetric(10, 6));
         Panel::bottom("predicted")
             .frame(bottom)
             .resizable(true)
-            .default_size(206.0)
+            .default_size(224.0)
             .size_range(120.0..=420.0)
-            .show(ui, |ui| self.predicted.ui(context, ui));
+            .show(ui, |ui| self.predicted.ui(context, &mut self.trials, ui));
         // What a session has brought stays in view after its end.
         let shown = context.source == Source::Simulated
             || context.link.is_open()

@@ -8,6 +8,7 @@ use flqr_core::friction::{Stribeck, StribeckParameters};
 use flqr_core::model_file::presets;
 use flqr_core::robot::RobotParameters;
 
+use super::weights::note_edit;
 use crate::command::Command;
 use crate::context::ViewContext;
 use crate::session::Session;
@@ -93,7 +94,9 @@ impl ParameterEditor {
         Grid::new("robot").num_columns(3).spacing([8.0, 3.0]).show(ui, |ui| {
             for (key, name, unit, help, value) in ROBOT_FIELDS {
                 ui.label(name).on_hover_text(help);
-                number_ui(ui, value(robot), &format!("{name} value"), 64.0).on_hover_text(help);
+                let field = number_ui(ui, value(robot), &format!("{name} value"), 64.0);
+                note_edit(context, &field);
+                field.on_hover_text(help);
                 ui.label(unit);
                 ui.end_row();
                 problem_row_ui(ui, refused.as_ref(), key);
@@ -113,7 +116,7 @@ impl ParameterEditor {
                 self.torque_limit_nm = limited.then(|| FIRST_VALUES.torque_limit_nm);
             }
             if let Some(limit) = &mut self.torque_limit_nm {
-                number_ui(ui, limit, "torque limit value", 64.0);
+                note_edit(context, &number_ui(ui, limit, "torque limit value", 64.0));
                 ui.label("N m");
             }
         });
@@ -143,8 +146,9 @@ impl ParameterEditor {
                     match &mut self.friction[motor] {
                         Some(curve) => {
                             let accessible = format!("{name} friction {side}");
-                            number_ui(ui, value(curve), &accessible, 54.0)
-                                .on_hover_text(format!("{help}, {side} motor [{unit}]"));
+                            let field = number_ui(ui, value(curve), &accessible, 54.0);
+                            note_edit(context, &field);
+                            field.on_hover_text(format!("{help}, {side} motor [{unit}]"));
                         }
                         None => {
                             ui.weak("–");

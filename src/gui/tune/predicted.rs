@@ -1,100 +1,290 @@
-//! What the linear model predicts for the gains in force and for A: responses and poles.
+//! What the loop as it runs will do after a disturbance, for the design in force and the other one; and its poles.
 
-use egui::{Ui, vec2};
-use egui_plot::{
-    Corner, HLine, Legend, Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotPoints, Points, VLine,
-};
+use egui::{Color32, Ui, Vec2, vec2};
+use egui_plot::{Corner, HLine, Legend, Line, LineStyle, Plot, PlotPoint, PlotPoints};
+use flqr_core::lqr::{Disturbance, SampledPole, SampledResponse, sampled_poles, sampled_response};
 use flqr_core::robot::State;
-use flqr_core::simulate::predicted_response;
 
+use super::pole_plane::PolePlane;
+use super::trials::Trials;
 use crate::context::ViewContext;
 use crate::design::Designed;
 use crate::plot::Axes;
-use crate::theme::{Palette, palette};
+use crate::theme::palette;
+use crate::widgets::{hint_ui, shown};
 
-/// The response starts displaced by this, at rest and upright, m.
-const START_M: f64 = -0.1;
+/// Points of a drawn curve.
 const POINTS: usize = 400;
+/// Longest response, s.
+const LONGEST_S: f64 = 20.0;
+/// Widths of the page from which on there is room for another plot.
+const ROOM_FOR_MORE: f32 = 860.0;
+/// Share of the limit from which on it is drawn.
+const NEAR_LIMIT: f64 = 0.4;
+
+/// What is drawn of a response.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Shown {
+    Displacement,
+    Pitch,
+    Torque,
+}
+
+impl Shown {
+    fn label(self) -> &'static str {
+        match self {
+            Self::Displacement => "displacement [m]",
+            Self::Pitch => "pitch [°]",
+            Self::Torque => "torque of a motor [N m]",
+        }
+    }
+
+    /// Where the legend is in nobody's way.
+    fn corner(self) -> Corner {
+        match self {
+            Self::Displacement => Corner::RightBottom,
+            Self::Pitch | Self::Torque => Corner::RightTop,
+        }
+    }
+}
 
 /// A predicted response, ready for plotting.
 #[derive(Default)]
 struct Response {
-    of: Option<(Designed, f64)>,
+    of: Option<(Designed, Disturbance, f64)>,
     displacement: Vec<PlotPoint>,
     pitch_deg: Vec<PlotPoint>,
+    torque_nm: Vec<PlotPoint>,
+    /// What a reader would measure.
+    summary: String,
+    poles: Vec<SampledPole>,
 }
 
-/// Predicted responses of the gains in force and of A.
-#[derive(Default)]
+/// Predictions for the design in force and for the other one.
 pub(super) struct Predicted {
-    new: Response,
-    old: Response,
+    now: Response,
+    other: Response,
+    plane: PolePlane,
+    /// What the first plot shows where there is no room for more.
+    first: Shown,
+}
+
+impl Default for Predicted {
+    fn default() -> Self {
+        Self {
+            now: Response::default(),
+            other: Response::default(),
+            plane: PolePlane::default(),
+            first: Shown::Displacement,
+        }
+    }
 }
 
 impl Predicted {
-    pub(super) fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
-        let Some(new) = context.designer.in_force else {
+    /// Poles of the design in force, of the loop as it runs.
+    pub(super) fn poles(&mut self, context: &ViewContext<'_>, trials: &Trials) -> &[SampledPole] {
+        self.update(context, trials.shown());
+        &self.now.poles
+    }
+
+    fn update(&mut self, context: &ViewContext<'_>, disturbance: Disturbance) {
+        let Some(now) = context.designer.in_force else {
+            self.now = Response::default();
+            return;
+        };
+        let other = context.designer.different();
+        let seconds = duration_s(&now).max(other.as_ref().map_or(0.0, duration_s));
+        self.now.update(&now, disturbance, seconds);
+        match other {
+            Some(other) => self.other.update(&other, disturbance, seconds),
+            None => self.other = Response::default(),
+        }
+    }
+
+    pub(super) fn ui(&mut self, context: &ViewContext<'_>, trials: &mut Trials, ui: &mut Ui) {
+        if context.designer.in_force.is_none() {
             // Filled, or the panel would shrink and stay so.
             let size = ui.available_size();
             ui.label(egui::RichText::new("Predicted").heading().strong());
-            crate::widgets::hint_ui(ui, "no design");
+            hint_ui(ui, "no design");
             ui.set_min_size(size);
             return;
-        };
-        let old = context.designer.reference.filter(|reference| reference.design != new.design);
-        let seconds = duration_s(&new).max(old.as_ref().map_or(0.0, duration_s));
-        self.new.update(context, &new, seconds);
-        if let Some(old) = &old {
-            self.old.update(context, old, seconds);
         }
-        let colors = palette(ui.visuals());
-        ui.horizontal(|ui| {
-            ui.label(egui::RichText::new("Predicted").heading().strong());
-            crate::widgets::hint_ui(ui, "from 0.1 m behind, linear, without noise, delay and friction");
-        });
-        let size = vec2((ui.available_width() - 16.0) / 3.0, ui.available_height());
-        let old_response = old.as_ref().map(|_| &self.old);
+        self.update(context, trials.shown());
+        let many = ui.available_width() >= ROOM_FOR_MORE;
+        ui.horizontal(|ui| self.head_ui(context, trials, many, ui));
+        let shown: &[Shown] = match (many, self.first) {
+            (true, _) => &[Shown::Displacement, Shown::Pitch, Shown::Torque],
+            (false, first) => &[first, Shown::Torque],
+        };
+        let spacing = ui.spacing().item_spacing.x;
+        let plane = (0.34 * ui.available_width()).clamp(150.0, 340.0);
+        let width = (ui.available_width() - plane) / shown.len() as f32 - spacing;
+        let size = vec2(width, ui.available_height());
+        let limit_nm = context.session.robot().and_then(|robot| robot.limits.torque_nm);
         ui.horizontal_top(|ui| {
-            let pick_x: Pick = |response| &response.displacement;
-            let pick_pitch: Pick = |response| &response.pitch_deg;
-            response_plot(ui, size, "displacement [m]", &self.new, old_response, pick_x, colors);
-            response_plot(ui, size, "pitch [°]", &self.new, old_response, pick_pitch, colors);
-            pole_plot(ui, size, &new, old.as_ref(), colors);
+            for what in shown {
+                self.response_plot(context, *what, limit_nm, ui, size);
+            }
+            let size = vec2(ui.available_width(), ui.available_height());
+            self.plane.ui(context, (&self.now.poles, &self.other.poles), ui, size);
         });
+    }
+
+    fn head_ui(&mut self, context: &ViewContext<'_>, trials: &mut Trials, many: bool, ui: &mut Ui) {
+        ui.label(egui::RichText::new("Predicted").heading().strong());
+        trials.choice_ui(ui);
+        if !many {
+            ui.separator();
+            let choices = [
+                (Shown::Displacement, "x", "Displacement in the first plot"),
+                (Shown::Pitch, "θ", "Pitch in the first plot"),
+            ];
+            ui.scope(|ui| crate::widgets::choice_ui(ui, &mut self.first, &choices));
+        }
+        ui.separator();
+        self.plane.choice_ui(ui);
+        ui.separator();
+        let mut text = format!("{}: {}", trials.shown_text(), self.now.summary);
+        if !self.other.summary.is_empty() {
+            let designer = context.designer;
+            text = format!(
+                "{}: {} {}, {} {}",
+                trials.shown_text(),
+                designer.active.name(),
+                self.now.summary,
+                designer.active.other().name(),
+                self.other.summary
+            );
+        }
+        let label = egui::Label::new(egui::RichText::new(text.as_str()).small().weak()).truncate();
+        ui.add(label).on_hover_text(format!(
+            "{text}. Linear, with the loop's tick, delay and held IMU; without noise, friction and torque limit"
+        ));
+    }
+
+    fn response_plot(
+        &self,
+        context: &ViewContext<'_>,
+        what: Shown,
+        limit_nm: Option<f64>,
+        ui: &mut Ui,
+        size: Vec2,
+    ) {
+        let colors = palette(ui.visuals());
+        let legend =
+            Legend::default().position(what.corner()).follow_insertion_order(true).background_alpha(0.6);
+        let mut plot = quiet_plot(ui, size, "time [s]", what.label());
+        if context.designer.different().is_some() {
+            plot = plot.legend(legend);
+        }
+        let names = [context.designer.active.other().name(), context.designer.active.name()];
+        plot.show(ui, |plot_ui| {
+            let limit = limit_nm.filter(|_| what == Shown::Torque);
+            let near = |limit: &f64| self.peak_nm() >= NEAR_LIMIT * limit;
+            for limit in limit.filter(near).into_iter().flat_map(|limit| [-limit, limit]) {
+                let line = HLine::new("", limit).color(colors.error.gamma_multiply(0.8)).width(1.0);
+                plot_ui.hline(line.allow_hover(false));
+            }
+            let curve = |name: &'static str, points, color: Color32, width: f32| {
+                Line::new(name, PlotPoints::Borrowed(points)).color(color).width(width).allow_hover(false)
+            };
+            if !self.other.displacement.is_empty() {
+                let line = curve(names[0], self.other.points(what), colors.reference, 1.5);
+                plot_ui.line(line.style(LineStyle::dashed_loose()));
+            }
+            plot_ui.line(curve(names[1], self.now.points(what), colors.accent, 1.8));
+        });
+    }
+
+    fn peak_nm(&self) -> f64 {
+        let all = self.now.torque_nm.iter().chain(&self.other.torque_nm);
+        all.fold(0.0, |peak: f64, point| peak.max(point.y.abs()))
     }
 }
 
 impl Response {
-    fn update(&mut self, context: &ViewContext<'_>, designed: &Designed, seconds: f64) {
-        let Some(robot) = context.session.robot() else { return };
-        let key = Some((*designed, seconds));
+    fn update(&mut self, designed: &Designed, disturbance: Disturbance, seconds: f64) {
+        let key = Some((*designed, disturbance, seconds));
         if self.of == key {
             return;
         }
         self.of = key;
-        let robot = flqr_core::model_file::RobotModel { parameters: designed.parameters, ..robot.clone() };
-        let initial = State { x_m: START_M, ..State::default() };
-        let step = seconds / POINTS as f64;
-        let response = predicted_response(&robot, &designed.design.gain, initial, seconds, step);
-        let points = |value: fn(&State) -> f64| {
-            let all = response.iter().map(|(time, state)| PlotPoint::new(*time, value(state)));
-            all.filter(|point| point.y.is_finite()).collect()
-        };
-        self.displacement = points(|state| state.x_m);
-        self.pitch_deg = points(|state| state.pitch_rad.to_degrees());
+        let (model, gain) = (designed.parameters.linear_model(), &designed.design.gain);
+        let initial = disturbance.state(&designed.parameters);
+        let response = sampled_response(&model, gain, &designed.timing, &initial, seconds);
+        self.displacement = thinned(&response, |index| response.states[index].x_m);
+        self.pitch_deg = thinned(&response, |index| response.states[index].pitch_rad.to_degrees());
+        self.torque_nm = thinned(&response, |index| stronger(response.torque_nm[index]));
+        self.summary = summary(&response, disturbance);
+        self.poles = sampled_poles(&model, gain, &designed.timing);
+    }
+
+    fn points(&self, what: Shown) -> &[PlotPoint] {
+        match what {
+            Shown::Displacement => &self.displacement,
+            Shown::Pitch => &self.pitch_deg,
+            Shown::Torque => &self.torque_nm,
+        }
     }
 }
 
-type Pick = fn(&Response) -> &Vec<PlotPoint>;
+fn stronger([left, right]: [f64; 2]) -> f64 {
+    if left.abs() >= right.abs() { left } else { right }
+}
+
+/// The curve with the smallest and the largest value of each of its parts, so that no peak is lost.
+fn thinned(response: &SampledResponse, value: impl Fn(usize) -> f64) -> Vec<PlotPoint> {
+    let count = response.states.len();
+    let part = count.div_ceil(POINTS / 2).max(1);
+    let mut points = Vec::with_capacity(POINTS + 2);
+    for start in (0..count).step_by(part) {
+        let range = start..(start + part).min(count);
+        let by_value = |a: &usize, b: &usize| value(*a).total_cmp(&value(*b));
+        let (Some(low), Some(high)) = (range.clone().min_by(by_value), range.max_by(by_value)) else {
+            continue;
+        };
+        let both = [low.min(high), low.max(high)];
+        let different = if low == high { &both[..1] } else { &both[..] };
+        points.extend(
+            different.iter().map(|index| PlotPoint::new(*index as f64 * response.tick_s, value(*index))),
+        );
+    }
+    points.retain(|point| point.y.is_finite());
+    points
+}
+
+/// Largest pitch and torque, and when it is where it belongs, in one line.
+fn summary(response: &SampledResponse, disturbance: Disturbance) -> String {
+    if response.states.is_empty() {
+        return "not analysed: its delay is too long".to_owned();
+    }
+    let largest = |value: &dyn Fn(&State) -> f64| {
+        response.states.iter().fold(0.0, |peak: f64, state| peak.max(value(state).abs()))
+    };
+    let pitch_deg = largest(&|state| state.pitch_rad).to_degrees();
+    let peak = format!("{}° and {} N m at most", shown(pitch_deg, 3), shown(response.peak_torque_nm(), 3));
+    let x_m = largest(&|state| state.x_m);
+    // What counts as arrived: 2 % of the step, or of the farthest it was driven off.
+    let band_m = 0.02 * if let Disturbance::Step(step) = disturbance { step.abs() } else { x_m };
+    let last = response.states.iter().rposition(|state| state.x_m.abs() > band_m);
+    match last {
+        Some(last) if last + 1 == response.states.len() => {
+            format!("{peak}, not back after {} s", shown(last as f64 * response.tick_s, 2))
+        }
+        Some(last) => format!("{peak}, back after {} s", shown((last + 1) as f64 * response.tick_s, 2)),
+        None => peak,
+    }
+}
 
 /// Until the slowest pole has faded to 1 %, in steps so that a drag does not stretch the axis all the time.
 fn duration_s(designed: &Designed) -> f64 {
     let slowest = designed.design.poles.iter().map(|pole| -pole.re).fold(f64::INFINITY, f64::min);
-    let wanted = (4.6 / slowest).clamp(0.5, 60.0);
-    [1.0, 2.0, 3.0, 5.0, 8.0, 12.0, 20.0, 30.0, 60.0].into_iter().find(|s| *s >= wanted).unwrap_or(60.0)
+    let wanted = (4.6 / slowest).clamp(0.5, LONGEST_S);
+    [1.0, 2.0, 3.0, 5.0, 8.0, 12.0].into_iter().find(|s| *s >= wanted).unwrap_or(LONGEST_S)
 }
 
-fn quiet_plot<'a>(ui: &Ui, size: egui::Vec2, x_label: &'a str, y_label: &'a str) -> Plot<'a> {
+pub(super) fn quiet_plot<'a>(ui: &Ui, size: Vec2, x_label: &'a str, y_label: &'a str) -> Plot<'a> {
     let plot = Plot::new(("predicted", y_label))
         .width(size.x.max(1.0))
         .height(size.y.max(1.0))
@@ -105,59 +295,4 @@ fn quiet_plot<'a>(ui: &Ui, size: egui::Vec2, x_label: &'a str, y_label: &'a str)
         .allow_axis_zoom_drag(false)
         .label_formatter(|_| None);
     Axes { x_label: Some(x_label), y_label, x_lines: 4.0, y_lines: 4.0 }.on(plot, ui.visuals())
-}
-
-fn response_plot(
-    ui: &mut Ui,
-    size: egui::Vec2,
-    label: &str,
-    new: &Response,
-    old: Option<&Response>,
-    pick: Pick,
-    colors: Palette,
-) {
-    // The displacement ends at the top, the pitch begins there.
-    let corner = if label.starts_with("pitch") { Corner::RightTop } else { Corner::RightBottom };
-    let plot = quiet_plot(ui, size, "time [s]", label)
-        .legend(Legend::default().position(corner).follow_insertion_order(true).background_alpha(0.6));
-    plot.show(ui, |plot_ui| {
-        if let Some(old) = old {
-            plot_ui.line(
-                Line::new("A", PlotPoints::Borrowed(pick(old)))
-                    .color(colors.reference)
-                    .style(LineStyle::dashed_loose())
-                    .width(1.5)
-                    .allow_hover(false),
-            );
-        }
-        plot_ui.line(
-            Line::new("in force", PlotPoints::Borrowed(pick(new)))
-                .color(colors.accent)
-                .width(1.8)
-                .allow_hover(false),
-        );
-    });
-}
-
-fn pole_plot(ui: &mut Ui, size: egui::Vec2, new: &Designed, old: Option<&Designed>, colors: Palette) {
-    let points = |designed: &Designed| -> PlotPoints<'static> {
-        let finite = designed.design.poles.iter().filter(|pole| pole.re.is_finite() && pole.im.is_finite());
-        finite.map(|pole| [pole.re, pole.im]).collect()
-    };
-    let plot = quiet_plot(ui, size, "poles, real [1/s]", "imaginary [1/s]")
-        .include_x(0.5)
-        .include_y(-1.0)
-        .include_y(1.0)
-        .set_margin_fraction(vec2(0.1, 0.15));
-    plot.show(ui, |plot_ui| {
-        let axis = egui::Stroke::new(1.0, colors.reference.gamma_multiply(0.6));
-        plot_ui.hline(HLine::new("real axis", 0.0).stroke(axis).allow_hover(false));
-        plot_ui.vline(VLine::new("limit of stability", 0.0).stroke(axis).allow_hover(false));
-        if let Some(old) = old {
-            let marks = Points::new("A", points(old)).shape(MarkerShape::Cross).radius(4.5);
-            plot_ui.points(marks.color(colors.reference).allow_hover(false));
-        }
-        let marks = Points::new("in force", points(new)).shape(MarkerShape::Cross).radius(5.5);
-        plot_ui.points(marks.color(colors.accent).allow_hover(false));
-    });
 }

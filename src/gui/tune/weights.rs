@@ -1,12 +1,12 @@
 //! The Q/R editor: one row a weight, with the deviation that it makes count as 1.
 
-use egui::{Response, Slider, SliderClamping, Ui};
+use egui::{Button, Response, Slider, SliderClamping, Ui};
 use flqr_core::lqr::Weights;
 
 use super::matrices::matrices_ui;
 use crate::command::Command;
 use crate::context::ViewContext;
-use crate::widgets::{hint_ui, mono, number_ui, section_ui, shown};
+use crate::widgets::{choice_ui, hint_ui, number_ui, section_ui};
 
 /// What one weight is about.
 struct Row {
@@ -35,26 +35,39 @@ const R_ROWS: [Row; 2] = [
     Row { name: "right torque", unit: "N m", unit_si: 1.0, help: "R₂₂, 1/(N m)²" },
 ];
 
+/// Steps that are offered, from the right to the left as they are drawn.
+const STEPS: [(f64, &str, &str); 3] = [
+    (0.25, "25 %", "The buttons − and + change a weight by 25 %"),
+    (0.10, "10 %", "The buttons − and + change a weight by 10 %"),
+    (0.05, "5 %", "The buttons − and + change a weight by 5 %"),
+];
+
 /// State of the editor.
 pub(super) struct WeightEditor {
     full_matrices: bool,
     link_motors: bool,
+    step: f64,
     pub(super) focus_first: bool,
 }
 
 impl Default for WeightEditor {
     fn default() -> Self {
-        Self { full_matrices: false, link_motors: true, focus_first: false }
+        Self { full_matrices: false, link_motors: true, step: 0.10, focus_first: false }
     }
 }
 
 impl WeightEditor {
     pub(super) fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
         section_ui(ui, "Weights", |ui| {
-            let help = "Back to the weights of the loaded model";
-            if ui.small_button("Reset weights").on_hover_text(help).clicked() {
+            let help = "All weights as in the loaded model";
+            let changed = context.session.weights() != context.saved.weights();
+            let reset = ui.add_enabled(changed, Button::new("Reset").small());
+            if reset.accessible_name("Reset weights").on_hover_text(help).clicked() {
                 context.commands.send(Command::ResetWeights);
             }
+            ui.separator();
+            ui.scope(|ui| choice_ui(ui, &mut self.step, &STEPS));
+            hint_ui(ui, "± step");
         });
         let before = context.session.weights();
         let mut weights = before;
@@ -77,32 +90,93 @@ impl WeightEditor {
     }
 
     fn rows_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui, weights: &mut Weights) {
-        egui::Grid::new("weights").num_columns(4).spacing([8.0, 4.0]).show(ui, |ui| {
+        let saved = context.saved.weights();
+        egui::Grid::new("weights").num_columns(6).spacing([6.0, 4.0]).show(ui, |ui| {
+            ui.label("");
             ui.label("");
             hint_ui(ui, "weight");
-            ui.label("");
             hint_ui(ui, "counts as 1").on_hover_text(
-                "Bryson's rule: the deviation whose square, times the weight, is 1. Choose the largest deviation that you accept.",
+                "Bryson's rule: the deviation whose square, times the weight, is 1. Choose the largest deviation that you accept, and the weight follows.",
             );
             ui.end_row();
             for (index, row) in Q_ROWS.iter().enumerate() {
                 let focus = index == 0 && std::mem::take(&mut self.focus_first);
                 let before = weights.q[(index, index)];
                 let mut weight = before;
-                row_ui(context, ui, row, &mut weight, focus);
+                self.row_ui(context, ui, row, (&mut weight, saved.q[(index, index)]), focus);
                 if weight != before {
                     weights.set_state_weight(index, weight);
                 }
             }
             let old = [weights.r[(0, 0)], weights.r[(1, 1)]];
             for (index, row) in R_ROWS.iter().enumerate() {
-                row_ui(context, ui, row, &mut weights.r[(index, index)], false);
+                let entry = (index, index);
+                self.row_ui(context, ui, row, (&mut weights.r[entry], saved.r[entry]), false);
             }
             if self.link_motors {
                 link(weights, old);
             }
         });
     }
+
+    fn row_ui(
+        &self,
+        context: &ViewContext<'_>,
+        ui: &mut Ui,
+        row: &Row,
+        (weight, saved): (&mut f64, f64),
+        focus: bool,
+    ) {
+        ui.label(row.name).on_hover_text(row.help);
+        ui.spacing_mut().slider_width = 58.0;
+        let slider = Slider::new(weight, SMALLEST..=LARGEST)
+            .logarithmic(true)
+            .smallest_positive(SMALLEST)
+            .clamping(SliderClamping::Never)
+            .show_value(false);
+        let slider = ui.add(slider).accessible_name(format!("{} weight slider", row.name));
+        note_edit(context, &slider);
+        slider.on_hover_text(row.help);
+        ui.horizontal(|ui| {
+            ui.spacing_mut().item_spacing.x = 2.0;
+            self.step_ui(ui, row, weight, Step::Down);
+            let field = number_ui(ui, weight, &format!("{} weight", row.name), 52.0);
+            note_edit(context, &field);
+            if focus {
+                field.request_focus();
+            }
+            field.on_hover_text(row.help);
+            self.step_ui(ui, row, weight, Step::Up);
+        });
+        deviation_ui(context, ui, row, weight);
+        let changed = *weight != saved;
+        let reset = ui.add_enabled(changed, Button::new("↺").small().frame(false));
+        let reset = reset.accessible_name(format!("reset {} weight", row.name));
+        if reset.on_hover_text(format!("Back to {}, as loaded", crate::widgets::plain(saved, 4))).clicked() {
+            *weight = saved;
+        }
+        ui.end_row();
+    }
+
+    fn step_ui(&self, ui: &mut Ui, row: &Row, weight: &mut f64, step: Step) {
+        let (sign, word, factor) = match step {
+            Step::Down => ("−", "less", 1.0 / (1.0 + self.step)),
+            Step::Up => ("+", "more", 1.0 + self.step),
+        };
+        let button = Button::new(sign).small().min_size(egui::vec2(18.0, 20.0));
+        let button = ui.add(button).accessible_name(format!("{word} {} weight", row.name));
+        if button.on_hover_text(format!("{:.0} % {word} weight on {}", 100.0 * self.step, row.name)).clicked()
+        {
+            *weight *= factor;
+        }
+    }
+}
+
+/// Which way a step goes.
+#[derive(Clone, Copy)]
+enum Step {
+    Down,
+    Up,
 }
 
 /// The motor that was not changed follows the one that was.
@@ -114,33 +188,35 @@ fn link(weights: &mut Weights, old: [f64; 2]) {
     }
 }
 
-fn row_ui(context: &ViewContext<'_>, ui: &mut Ui, row: &Row, weight: &mut f64, focus: bool) {
-    ui.label(row.name).on_hover_text(row.help);
-    let slider = Slider::new(weight, SMALLEST..=LARGEST)
-        .logarithmic(true)
-        .smallest_positive(SMALLEST)
-        .clamping(SliderClamping::Never)
-        .show_value(false);
-    let slider = ui.add(slider).accessible_name(format!("{} weight slider", row.name));
-    begin_drag(context, &slider);
-    slider.on_hover_text(row.help);
-    let field = number_ui(ui, weight, &format!("{} weight", row.name), 58.0);
-    begin_drag(context, &field);
-    if field.gained_focus() {
-        context.commands.send(Command::BeginWeightDrag);
-    }
-    if focus {
-        field.request_focus();
-    }
-    field.on_hover_text(row.help);
-    let deviation = 1.0 / weight.sqrt() / row.unit_si;
-    let text = if deviation.is_finite() { shown(deviation, 3) } else { "–".to_owned() };
-    ui.label(mono(format!("{text} {}", row.unit)));
-    ui.end_row();
+/// The deviation that counts as 1, as another way to say the weight.
+fn deviation_ui(context: &ViewContext<'_>, ui: &mut Ui, row: &Row, weight: &mut f64) {
+    let before = 1.0 / weight.sqrt() / row.unit_si;
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 3.0;
+        if !before.is_finite() {
+            ui.weak("–").on_hover_text("A weight that is not above 0 has no such deviation");
+            return;
+        }
+        let mut deviation = before;
+        let field = number_ui(ui, &mut deviation, &format!("{} deviation", row.name), 46.0);
+        note_edit(context, &field);
+        field.on_hover_text(format!(
+            "The deviation of {} that counts as 1: weight = 1/deviation², in SI units",
+            row.name
+        ));
+        ui.label(egui::RichText::new(row.unit).small());
+        if deviation != before && deviation > 0.0 {
+            *weight = (deviation * row.unit_si).powi(-2);
+        }
+    });
 }
 
-fn begin_drag(context: &ViewContext<'_>, response: &Response) {
-    if response.drag_started() {
+/// Tells where one change of a value begins and ends, be it dragged or typed.
+pub(super) fn note_edit(context: &ViewContext<'_>, response: &Response) {
+    if response.drag_started() || response.gained_focus() {
         context.commands.send(Command::BeginWeightDrag);
+    }
+    if response.drag_stopped() || response.lost_focus() {
+        context.commands.send(Command::EndWeightDrag);
     }
 }

@@ -1,0 +1,174 @@
+//! What the loop bears as it runs, sampled and delayed: each margin with its verdict, and a sentence.
+
+use egui::{CollapsingHeader, Grid, Ui};
+use flqr_core::lqr::SampledPole;
+
+use super::verdict::Verdict;
+use crate::design::Designed;
+use crate::widgets::{error_ui, hint_ui, mono, plain, section_ui, shown, warning_ui};
+
+/// Usual demands: a factor of 2 up and of 0.7 down, 45° of phase, twice the delay that there is; and half of that.
+const GAIN_UP: [f64; 2] = [2.0, 1.5];
+const GAIN_DOWN: [f64; 2] = [1.0 / 0.7, 1.0 / 0.85];
+const PHASE_DEG: [f64; 2] = [45.0, 30.0];
+const DELAYS: [f64; 2] = [2.0, 1.0];
+
+/// One margin for people.
+struct Row {
+    name: &'static str,
+    value: String,
+    help: &'static str,
+    verdict: Verdict,
+    /// What the robot does where it is used up.
+    then: String,
+}
+
+/// The margins of the design in force.
+pub(super) fn ui(designed: &Designed, poles: &[SampledPole], ui: &mut Ui) {
+    let runs = runs(designed);
+    section_ui(ui, "Stability", |ui| {
+        hint_ui(ui, runs.as_str()).on_hover_text(
+            "The loop as it runs: time from a measurement to its torque, and the held samples of the IMU, are in all numbers here",
+        );
+    });
+    if !designed.margins.stable {
+        error_ui(
+            ui,
+            format!("Unstable as it runs ({runs}): less weight on the states, or more on the torques."),
+        );
+        return;
+    }
+    let rows = rows(designed);
+    Grid::new("margins").num_columns(3).spacing([8.0, 2.0]).show(ui, |ui| {
+        for row in &rows {
+            row.verdict.mark_ui(ui, row.name);
+            ui.label(row.name).on_hover_text(row.help);
+            ui.label(mono(&row.value)).on_hover_text(row.help);
+            ui.end_row();
+        }
+    });
+    sentence_ui(ui, &rows);
+    poles_ui(ui, poles);
+}
+
+fn runs(designed: &Designed) -> String {
+    let timing = &designed.timing;
+    format!(
+        "1 kHz, {} ms of delay, IMU at {} Hz",
+        plain(1e3 * timing.delay_s, 3),
+        plain(1.0 / timing.imu_period_s, 3)
+    )
+}
+
+fn rows(designed: &Designed) -> Vec<Row> {
+    let (margins, timing) = (&designed.margins, &designed.timing);
+    let hertz = |rad_s: f64| format!("{} Hz", shown(rad_s / std::f64::consts::TAU, 2));
+    let decibels = |factor: f64| format!("{} dB", shown(20.0 * factor.log10(), 2));
+    let up = margins.gain_up;
+    let phase_deg = margins.phase_rad.to_degrees();
+    // Without a delay of its own a loop is to bear that of one tick.
+    let delays = margins.delay_s / timing.delay_s.max(timing.tick_s);
+    vec![
+        Row {
+            name: "gain up",
+            value: if up.is_finite() {
+                format!("×{}   {}", shown(up, 3), decibels(up))
+            } else {
+                "any".to_owned()
+            },
+            help: "So much more torque per command (or gain) until it oscillates",
+            verdict: Verdict::of(up, GAIN_UP[0], GAIN_UP[1]),
+            then: format!(
+                "with {} times the torque it swings at {}",
+                shown(up, 3),
+                hertz(margins.gain_up_rad_s)
+            ),
+        },
+        Row {
+            name: "gain down",
+            value: if margins.gain_down > 0.0 {
+                format!("×{}   {}", shown(margins.gain_down, 3), decibels(margins.gain_down))
+            } else {
+                "any".to_owned()
+            },
+            help: "So much less torque per command (or gain) until it no longer holds the body up",
+            verdict: Verdict::of(1.0 / margins.gain_down, GAIN_DOWN[0], GAIN_DOWN[1]),
+            then: format!("with {} of the torque it no longer balances", shown(margins.gain_down, 3)),
+        },
+        Row {
+            name: "phase",
+            value: format!("{}°   at {}", shown(phase_deg, 3), hertz(margins.crossover_rad_s)),
+            help: "Lag between command and torque until it oscillates, and the frequency at which the loop's gain passes 1",
+            verdict: Verdict::of(phase_deg, PHASE_DEG[0], PHASE_DEG[1]),
+            then: format!(
+                "with {}° more lag it swings at {}",
+                shown(phase_deg, 3),
+                hertz(margins.crossover_rad_s)
+            ),
+        },
+        Row {
+            name: "delay",
+            value: format!("+{} ms", shown(1e3 * margins.delay_s, 3)),
+            help: "Delay on top of the loop's own until it oscillates; tight where that is less than twice what it has, bad where it is less than that",
+            verdict: Verdict::of(delays, DELAYS[0], DELAYS[1]),
+            then: format!("{} ms more delay make it swing", shown(1e3 * margins.delay_s, 3)),
+        },
+    ]
+}
+
+/// What the worst margin means for the robot, and the mend.
+fn sentence_ui(ui: &mut Ui, rows: &[Row]) {
+    let Some(worst) = rows.iter().max_by_key(|row| row.verdict) else { return };
+    let mend = "More weight on the torques slows the loop down, less on the rates calms it.";
+    match worst.verdict {
+        Verdict::Good => {
+            hint_ui(ui, "It bears motors that are stronger, weaker or later than the model says.");
+        }
+        Verdict::Tight => {
+            warning_ui(ui, format!("Tight: {}. {mend}", worst.then));
+        }
+        Verdict::Bad => {
+            error_ui(ui, format!("Hardly stable: {}. {mend}", worst.then));
+        }
+    }
+}
+
+/// The poles as text, slowest first, conjugate pairs as one.
+fn poles_ui(ui: &mut Ui, poles: &[SampledPole]) {
+    CollapsingHeader::new("Poles").id_salt("pole list").show(ui, |ui| {
+        Grid::new("pole table").num_columns(4).spacing([10.0, 2.0]).show(ui, |ui| {
+            for head in ["pole, 1/s", "damping", "Hz", "z, one IMU period"] {
+                hint_ui(ui, head);
+            }
+            ui.end_row();
+            for pole in poles.iter().filter(|pole| pole.s.im >= 0.0) {
+                ui.label(mono(complex(pole.s.re, pole.s.im)));
+                ui.label(mono(shown(pole.damping(), 2)));
+                ui.label(mono(shown(pole.s.norm() / std::f64::consts::TAU, 3)));
+                ui.label(mono(complex(pole.z.re, pole.z.im)));
+                ui.end_row();
+            }
+        });
+    });
+}
+
+/// A number, or both of a conjugate pair.
+pub(super) fn complex(re: f64, im: f64) -> String {
+    if im.abs() < 1e-9 * re.abs().max(1.0) {
+        shown(re, 3)
+    } else {
+        format!("{}±{}i", shown(re, 3), shown(im.abs(), 3))
+    }
+}
+
+/// Margins and their verdicts, as `--state-out` writes them.
+pub(super) fn snapshot(designed: &Designed) -> serde_json::Value {
+    let verdicts: serde_json::Map<_, _> =
+        rows(designed).into_iter().map(|row| (row.name.to_owned(), row.verdict.word().into())).collect();
+    serde_json::json!({
+        "stable": designed.margins.stable,
+        "delay_s": designed.margins.delay_s,
+        "phase_rad": designed.margins.phase_rad,
+        "verdicts": verdicts,
+    })
+}

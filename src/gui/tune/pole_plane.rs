@@ -1,0 +1,230 @@
+//! Poles of the loop as it runs, on the plane of s or of z, with lines of equal damping and rings of equal frequency.
+
+use egui::{Color32, Pos2, Stroke, Ui, Vec2};
+use egui_plot::{Line, LineStyle, MarkerShape, PlotBounds, PlotPoints, PlotTransform, PlotUi, Points, Text};
+use flqr_core::lqr::SampledPole;
+
+use super::margins::complex;
+use super::predicted::quiet_plot;
+use crate::context::ViewContext;
+use crate::theme::palette;
+use crate::widgets::{choice_ui, shown};
+
+/// Dampings that are drawn as lines.
+const DAMPINGS: [f64; 4] = [0.3, 0.5, 0.7, 0.9];
+/// Poles that set the view: the plant's own are the slowest.
+const PLANTS: usize = 4;
+/// From the pointer to a pole that is told of, points.
+const REACH: f32 = 14.0;
+const RING_POINTS: usize = 96;
+/// How far the plane of s is seen to the left and to the right, in half widths.
+const LEFT: f64 = 1.7;
+const RIGHT: f64 = 0.3;
+
+/// The plane that is shown.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Plane {
+    /// Rates, 1/s: ln z over the IMU's period.
+    #[default]
+    S,
+    /// Factors over one IMU period.
+    Z,
+}
+
+/// What is chosen.
+#[derive(Default)]
+pub(super) struct PolePlane {
+    plane: Plane,
+}
+
+impl PolePlane {
+    pub(super) fn choice_ui(&mut self, ui: &mut Ui) {
+        let choices = [
+            (Plane::S, "s", "Poles as rates, 1/s: left of 0 they die out, far left fast"),
+            (Plane::Z, "z", "Poles as factors over one IMU period: inside of the unit circle they die out"),
+        ];
+        ui.scope(|ui| choice_ui(ui, &mut self.plane, &choices));
+    }
+
+    /// Draws the poles of the design in force and of the other one.
+    pub(super) fn ui(
+        &self,
+        context: &ViewContext<'_>,
+        (now, other): (&[SampledPole], &[SampledPole]),
+        ui: &mut Ui,
+        size: Vec2,
+    ) {
+        let colors = palette(ui.visuals());
+        let (x_label, y_label) = match self.plane {
+            Plane::S => ("poles, real [1/s]", "imaginary [1/s]"),
+            Plane::Z => ("poles, real z", "imaginary z"),
+        };
+        let bounds = match self.plane {
+            Plane::S => {
+                let [half, height] = rate_bounds(now, other, size);
+                PlotBounds::from_min_max([-LEFT * half, -height], [RIGHT * half, height])
+            }
+            Plane::Z => {
+                let half = 1.15 * f64::from((size.x.max(1.0) / size.y.max(1.0)).max(1.0));
+                PlotBounds::from_min_max([-half, -1.15], [half, 1.15])
+            }
+        };
+        let plot = quiet_plot(ui, size, x_label, y_label).show_grid(false);
+        let shown = plot.show(ui, |plot_ui| {
+            plot_ui.set_plot_bounds(bounds);
+            let quiet = colors.reference.gamma_multiply(0.45);
+            match self.plane {
+                Plane::S => rate_lines(plot_ui, &bounds, quiet),
+                Plane::Z => factor_lines(plot_ui, quiet),
+            }
+            self.marks(plot_ui, other, 4.0, colors.reference);
+            self.marks(plot_ui, now, 5.0, colors.accent);
+        });
+        let names = [context.designer.active, context.designer.active.other()].map(|slot| slot.name());
+        let all = now.iter().map(|pole| (names[0], pole)).chain(other.iter().map(|pole| (names[1], pole)));
+        let named = !other.is_empty();
+        let nearest =
+            shown.response.hover_pos().and_then(|pointer| self.nearest(&shown.transform, all, pointer));
+        shown.response.on_hover_ui_at_pointer(|ui| {
+            ui.label(match nearest {
+                Some((name, pole)) => told(name, pole, named),
+                None => "Poles of the loop as it runs, with its delay and held IMU. Rays: damping; rings: frequency. Point at a pole to read it."
+                    .to_owned(),
+            });
+        });
+    }
+
+    fn place(&self, pole: &SampledPole) -> [f64; 2] {
+        let at = match self.plane {
+            Plane::S => pole.s,
+            Plane::Z => pole.z,
+        };
+        [at.re, at.im]
+    }
+
+    fn marks(&self, plot_ui: &mut PlotUi<'_>, poles: &[SampledPole], radius: f32, color: Color32) {
+        let places =
+            poles.iter().map(|pole| self.place(pole)).filter(|[x, y]| x.is_finite() && y.is_finite());
+        let marks = Points::new("", places.collect::<PlotPoints<'_>>()).shape(MarkerShape::Cross);
+        plot_ui.points(marks.radius(radius).color(color).allow_hover(false));
+    }
+
+    fn nearest<'a>(
+        &self,
+        transform: &PlotTransform,
+        poles: impl Iterator<Item = (&'static str, &'a SampledPole)>,
+        pointer: Pos2,
+    ) -> Option<(&'static str, &'a SampledPole)> {
+        poles
+            .map(|(name, pole)| {
+                let [x, y] = self.place(pole);
+                (
+                    transform.position_from_point(&egui_plot::PlotPoint::new(x, y)).distance(pointer),
+                    name,
+                    pole,
+                )
+            })
+            .filter(|(distance, ..)| *distance <= REACH)
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+            .map(|(_, name, pole)| (name, pole))
+    }
+}
+
+fn told(name: &str, pole: &SampledPole, named: bool) -> String {
+    let of = if named { format!("{name}: ") } else { String::new() };
+    let time = if pole.s.re < 0.0 {
+        format!("fades to 1/e in {} ms", shown(-1e3 / pole.s.re, 3))
+    } else {
+        "does not die out".to_owned()
+    };
+    format!(
+        "{of}s = {} 1/s\ndamping {}, {} Hz\n{time}\nz = {}",
+        complex(pole.s.re, pole.s.im),
+        shown(pole.damping(), 3),
+        shown(pole.s.norm() / std::f64::consts::TAU, 3),
+        complex(pole.z.re, pole.z.im)
+    )
+}
+
+/// Half the width and height of the view, 1/s, with equal scales; in steps, so that it rests during a drag.
+fn rate_bounds(now: &[SampledPole], other: &[SampledPole], size: Vec2) -> [f64; 2] {
+    let width = f64::from((size.x - crate::plot::Y_AXIS_WIDTH).max(1.0));
+    let aspect = f64::from((size.y - 36.0).max(1.0)) / width;
+    let plants = now.iter().take(PLANTS).chain(other.iter().take(PLANTS)).map(|pole| pole.s);
+    let reach = plants
+        .filter(|s| s.norm().is_finite())
+        .map(|s| (-s.re / (0.95 * LEFT)).max(s.re / (0.8 * RIGHT)).max(s.im.abs() / (0.9 * aspect)))
+        .fold(1.0, f64::max);
+    let power = 10.0_f64.powf(reach.log10().floor());
+    let step = [1.0, 1.5, 2.0, 3.0, 5.0, 7.0].into_iter().find(|step| step * power >= reach).unwrap_or(10.0);
+    [step * power, step * power * aspect]
+}
+
+/// Rays of damping and rings of frequency, with their names.
+fn rate_lines(plot_ui: &mut PlotUi<'_>, bounds: &PlotBounds, color: Color32) {
+    let ([left, bottom], [right, top]) = (bounds.min(), bounds.max());
+    axis(plot_ui, [[0.0, bottom], [0.0, top]], color);
+    axis(plot_ui, [[left, 0.0], [right, 0.0]], color);
+    let faint = color.gamma_multiply(0.7);
+    for damping in DAMPINGS {
+        let slope = (1.0 - damping * damping).sqrt() / damping;
+        // As far as the edge that it meets first.
+        let length = (-left).min(top / slope);
+        for sign in [-1.0, 1.0] {
+            let end = [-length, sign * length * slope];
+            dashed(plot_ui, vec![[0.0, 0.0], end], faint);
+        }
+        let at = [-0.93 * length, 0.93 * length * slope];
+        text(plot_ui, at, &format!("{damping}"), color);
+    }
+    let rough = -left / 3.0;
+    let power = 10.0_f64.powf(rough.log10().floor());
+    let step =
+        [1.0, 2.0, 5.0, 10.0].into_iter().map(|m| m * power).find(|step| *step >= rough).unwrap_or(rough);
+    let mut radius = step;
+    while radius < -left {
+        dashed(plot_ui, arc(radius, [0.5, 1.5]), faint);
+        text(plot_ui, [-radius, 0.0], &format!("{} Hz", shown(radius / std::f64::consts::TAU, 2)), color);
+        radius += step;
+    }
+}
+
+/// The unit circle and curves of damping inside it.
+fn factor_lines(plot_ui: &mut PlotUi<'_>, color: Color32) {
+    axis(plot_ui, [[-1.0, 0.0], [1.0, 0.0]], color);
+    plot_ui.line(
+        Line::new("", PlotPoints::from(arc(1.0, [0.0, 2.0]))).color(color).width(1.2).allow_hover(false),
+    );
+    for damping in DAMPINGS {
+        let decay = damping / (1.0 - damping * damping).sqrt();
+        for sign in [-1.0, 1.0] {
+            let points = (0..=RING_POINTS).map(|index| {
+                let angle = std::f64::consts::PI * index as f64 / RING_POINTS as f64;
+                let size = (-decay * angle).exp();
+                [size * angle.cos(), sign * size * angle.sin()]
+            });
+            dashed(plot_ui, points.collect(), color.gamma_multiply(0.7));
+        }
+    }
+}
+
+fn arc(radius: f64, [from, to]: [f64; 2]) -> Vec<[f64; 2]> {
+    let angle =
+        |index: usize| std::f64::consts::PI * (from + (to - from) * index as f64 / RING_POINTS as f64);
+    (0..=RING_POINTS).map(|index| [radius * angle(index).cos(), radius * angle(index).sin()]).collect()
+}
+
+fn axis(plot_ui: &mut PlotUi<'_>, points: [[f64; 2]; 2], color: Color32) {
+    let line = Line::new("", PlotPoints::from(points.to_vec())).stroke(Stroke::new(1.0, color));
+    plot_ui.line(line.allow_hover(false));
+}
+
+fn dashed(plot_ui: &mut PlotUi<'_>, points: Vec<[f64; 2]>, color: Color32) {
+    let line = Line::new("", PlotPoints::from(points)).color(color).width(1.0);
+    plot_ui.line(line.style(LineStyle::dotted_dense()).allow_hover(false));
+}
+
+fn text(plot_ui: &mut PlotUi<'_>, at: [f64; 2], text: &str, color: Color32) {
+    let text = egui::RichText::new(text).size(10.0).color(color.gamma_multiply(1.8));
+    plot_ui.text(Text::new("", at.into(), text).anchor(egui::Align2::CENTER_BOTTOM).allow_hover(false));
+}

@@ -1,0 +1,306 @@
+//! Disturbances: the torque that they will ask for, against the motors' limit, and what the simulated robot does.
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use egui::{Grid, ProgressBar, RichText, Ui};
+use flqr_core::control::BalanceController;
+use flqr_core::lqr::{Disturbance, sampled_response};
+use flqr_core::model_file::RobotModel;
+use flqr_core::simulate::{Recovery, largest_pitch, recovery};
+
+use super::verdict::Verdict;
+use crate::context::ViewContext;
+use crate::design::Designed;
+use crate::job::{Job, Outcome, Reporter, Waker};
+use crate::widgets::{error_ui, hint_ui, mono, number_ui, section_ui, shown, warning_ui};
+
+/// The peak is looked for over this time, s.
+const PEAK_S: f64 = 3.0;
+/// Share of the limit up to which noise, friction and a second push have room.
+const ROOMY: f64 = 0.8;
+
+/// What is said of a kind of disturbance.
+struct Kind {
+    name: &'static str,
+    unit: &'static str,
+    /// Size of the unit in SI.
+    unit_si: f64,
+    largest: f64,
+    help: &'static str,
+}
+
+const KINDS: [Kind; 3] = [
+    Kind {
+        name: "kick",
+        unit: "N s",
+        unit_si: 1.0,
+        largest: 1e4,
+        help: "A blow to the body's centre of mass: force times duration",
+    },
+    Kind {
+        name: "lean",
+        unit: "°",
+        unit_si: std::f64::consts::PI / 180.0,
+        largest: 0.79,
+        help: "The body is let go at this pitch",
+    },
+    Kind {
+        name: "step",
+        unit: "m",
+        unit_si: 1.0,
+        largest: 1e4,
+        help: "The place to stand at jumps this far ahead",
+    },
+];
+
+/// What the simulated robot does, with noise, friction and limits.
+#[derive(Clone, Debug)]
+struct Simulated {
+    recoveries: [Option<Recovery>; 3],
+    largest_pitch_rad: Option<f64>,
+}
+
+/// What a simulation depends on.
+#[derive(Clone, Debug, PartialEq)]
+struct Question {
+    robot: RobotModel,
+    controller: BalanceController,
+    trials: [Disturbance; 3],
+}
+
+/// Disturbances to try, and what is known of them.
+pub(super) struct Trials {
+    trials: [Disturbance; 3],
+    /// Which one the predicted responses show.
+    shown: usize,
+    asked: Option<Question>,
+    job: Option<Job<(), Option<Simulated>>>,
+    answer: Option<Simulated>,
+    /// Peak torques of the design in force and of the other, N m.
+    peaks: Option<([Disturbance; 3], [Option<Designed>; 2], [[f64; 3]; 2])>,
+}
+
+impl Default for Trials {
+    fn default() -> Self {
+        Self {
+            trials: [
+                Disturbance::Kick(1.0),
+                Disturbance::Pitch(5.0_f64.to_radians()),
+                Disturbance::Step(0.1),
+            ],
+            shown: 2,
+            asked: None,
+            job: None,
+            answer: None,
+            peaks: None,
+        }
+    }
+}
+
+impl Trials {
+    /// The disturbance whose response is shown.
+    pub(super) fn shown(&self) -> Disturbance {
+        self.trials[self.shown]
+    }
+
+    /// Chooses it.
+    pub(super) fn choice_ui(&mut self, ui: &mut Ui) {
+        let choices: Vec<_> =
+            KINDS.iter().enumerate().map(|(index, kind)| (index, kind.name, kind.help)).collect();
+        ui.scope(|ui| crate::widgets::choice_ui(ui, &mut self.shown, &choices));
+    }
+
+    /// What it is, in words.
+    pub(super) fn shown_text(&self) -> String {
+        let kind = &KINDS[self.shown];
+        let size = shown(self.shown().size() / kind.unit_si, 3);
+        match self.shown() {
+            Disturbance::Kick(_) => format!("after a kick of {size} N s"),
+            Disturbance::Pitch(_) => format!("let go at {size}°"),
+            Disturbance::Step(_) => format!("after a step of {size} m"),
+        }
+    }
+
+    /// Peak torques for the shown disturbance of the design in force and of the other one, N m.
+    pub(super) fn shown_peaks_nm(&mut self, context: &ViewContext<'_>) -> [f64; 2] {
+        let shown = self.shown;
+        self.peaks_nm(context).map(|peaks| peaks[shown])
+    }
+
+    fn peaks_nm(&mut self, context: &ViewContext<'_>) -> [[f64; 3]; 2] {
+        let designs = [context.designer.in_force, context.designer.reference];
+        if let Some((trials, of, peaks)) = &self.peaks
+            && (trials, of) == (&self.trials, &designs)
+        {
+            return *peaks;
+        }
+        let peaks = designs.map(|designed| {
+            self.trials.map(|trial| designed.map_or(f64::NAN, |designed| peak_nm(&designed, trial)))
+        });
+        self.peaks = Some((self.trials, designs, peaks));
+        peaks
+    }
+
+    pub(super) fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
+        self.follow(context, ui);
+        let Some(robot) = context.session.robot() else { return };
+        let limit_nm = robot.limits.torque_nm;
+        section_ui(ui, "Effort", |ui| {
+            let text = limit_nm
+                .map_or("no torque limit".to_owned(), |limit| format!("limit {} N m", shown(limit, 3)));
+            hint_ui(ui, text).on_hover_text(
+                "Peak torque of one motor for each disturbance, linear with the loop's delay and without friction, against the motors' limit",
+            );
+        });
+        let [peaks, _] = self.peaks_nm(context);
+        Grid::new("trials").num_columns(5).spacing([6.0, 3.0]).show(ui, |ui| {
+            for (index, kind) in KINDS.iter().enumerate() {
+                let verdict = self.verdict(index, peaks[index], limit_nm);
+                verdict.mark_ui(ui, kind.name);
+                self.trial_ui(index, kind, ui);
+                peak_ui(ui, peaks[index], limit_nm, verdict);
+                ui.end_row();
+            }
+        });
+        if limit_nm.is_none() {
+            hint_ui(ui, "Tick “torque limit” of the robot to see what the motors can hold.");
+        }
+        self.sentences_ui(ui, &peaks, limit_nm);
+        self.largest_ui(ui);
+    }
+
+    fn trial_ui(&mut self, index: usize, kind: &Kind, ui: &mut Ui) {
+        let text = RichText::new(kind.name);
+        let choice = ui.selectable_label(self.shown == index, text);
+        if choice.accessible_name(format!("show {}", kind.name)).on_hover_text(kind.help).clicked() {
+            self.shown = index;
+        }
+        let mut size = self.trials[index].size() / kind.unit_si;
+        let before = size;
+        number_ui(ui, &mut size, &format!("{} size", kind.name), 44.0).on_hover_text(kind.help);
+        ui.label(RichText::new(kind.unit).small());
+        if size != before {
+            let size_si = (size * kind.unit_si).clamp(-kind.largest, kind.largest);
+            self.trials[index] = self.trials[index].of_size(size_si);
+        }
+    }
+
+    /// By the linear peak at first; what the simulated robot did counts for more, once it is known.
+    fn verdict(&self, index: usize, peak_nm: f64, limit_nm: Option<f64>) -> Verdict {
+        let share = peak_nm / limit_nm.unwrap_or(f64::INFINITY);
+        let falls =
+            self.answer.as_ref().and_then(|answer| answer.recoveries[index]).is_some_and(|r| !r.upright);
+        if falls || !share.is_finite() {
+            return Verdict::Bad;
+        }
+        match self.answer {
+            None => Verdict::of(1.0 / share, 1.0 / ROOMY, 1.0),
+            Some(_) if share > ROOMY => Verdict::Tight,
+            Some(_) => Verdict::Good,
+        }
+    }
+
+    fn sentences_ui(&self, ui: &mut Ui, peaks: &[f64; 3], limit_nm: Option<f64>) {
+        let Some(answer) = &self.answer else { return };
+        for (index, kind) in KINDS.iter().enumerate() {
+            let Some(found) = answer.recoveries[index] else { continue };
+            let beyond = limit_nm.is_some_and(|limit| peaks[index] > limit);
+            if !found.upright {
+                let why = if beyond { "the motors cannot hold it" } else { "it does not get over it" };
+                error_ui(ui, format!("{}: the simulated robot falls, {why}.", kind.name));
+            } else if beyond {
+                let time = shown(1e3 * found.at_limit_s, 2);
+                warning_ui(ui, format!("{}: at the limit for {time} ms, but it stays up.", kind.name));
+            }
+        }
+    }
+
+    fn largest_ui(&self, ui: &mut Ui) {
+        let text = match (&self.answer, &self.job) {
+            (Some(Simulated { largest_pitch_rad: Some(pitch), .. }), _) => {
+                format!("Gets up from a lean of {}° at most.", shown(pitch.to_degrees(), 3))
+            }
+            (Some(_), _) => "The simulated robot did not take these values.".to_owned(),
+            (None, Some(_)) => "Trying it on the simulated robot…".to_owned(),
+            (None, None) => return,
+        };
+        hint_ui(ui, text).on_hover_text(
+            "Largest pitch from which the simulated robot recovers, with its friction, noise, delay and limits; by bisection",
+        );
+    }
+
+    /// Asks the simulated robot anew when something has changed and no pointer holds it; the latest wins.
+    fn follow(&mut self, context: &ViewContext<'_>, ui: &Ui) {
+        if let Some(job) = &mut self.job {
+            match job.poll().1 {
+                Outcome::Running => {}
+                Outcome::Done(answer) => (self.answer, self.job) = (answer, None),
+                Outcome::Broken => self.job = None,
+            }
+        }
+        let question =
+            context.session.robot().zip(context.designer.in_force).and_then(|(robot, designed)| {
+                let controller = context.session.balance_controller(designed.design.gain)?;
+                Some(Question { robot: robot.clone(), controller, trials: self.trials })
+            });
+        if self.asked == question {
+            return;
+        }
+        // Of another design: no longer true.
+        (self.answer, self.job, self.asked) = (None, None, None);
+        let Some(question) = question.filter(|_| !ui.input(|input| input.pointer.any_down())) else { return };
+        self.asked = Some(question.clone());
+        let ctx = ui.ctx().clone();
+        let waker: Waker = Arc::new(move || ctx.request_repaint());
+        self.job = Job::start("trials", &waker, move |reporter| simulated(&question, reporter)).ok();
+    }
+
+    /// As `--state-out` writes it.
+    pub(super) fn snapshot(&self) -> serde_json::Value {
+        let recoveries = self.answer.as_ref().map(|answer| answer.recoveries.map(|r| r.map(|r| r.upright)));
+        serde_json::json!({
+            "peak_torque_nm": self.peaks.as_ref().map(|(_, _, [peaks, _])| peaks),
+            "upright": recoveries,
+            "largest_pitch_rad": self.answer.as_ref().and_then(|answer| answer.largest_pitch_rad),
+        })
+    }
+}
+
+/// Share of the limit as a bar, with the number on it.
+fn peak_ui(ui: &mut Ui, peak_nm: f64, limit_nm: Option<f64>, verdict: Verdict) {
+    let text = format!("{} N m", shown(peak_nm, 3));
+    let Some(limit) = limit_nm else {
+        ui.label(mono(text));
+        return;
+    };
+    let share = peak_nm / limit;
+    let color = verdict.color(ui).gamma_multiply(0.45);
+    let bar = ProgressBar::new(share.clamp(0.0, 1.0) as f32)
+        .desired_width(ui.available_width().clamp(90.0, 150.0))
+        .desired_height(18.0)
+        .corner_radius(3.0)
+        .fill(color)
+        .text(mono(format!("{text}  {:.0} %", 100.0 * share)).size(11.5));
+    ui.add(bar).on_hover_text("Peak torque of one motor, and its share of the limit");
+}
+
+fn peak_nm(designed: &Designed, trial: Disturbance) -> f64 {
+    let model = designed.parameters.linear_model();
+    let initial = trial.state(&designed.parameters);
+    let response = sampled_response(&model, &designed.design.gain, &designed.timing, &initial, PEAK_S);
+    if response.states.is_empty() { f64::NAN } else { response.peak_torque_nm() }
+}
+
+/// All trials and the largest pitch; none where it was cancelled.
+fn simulated(question: &Question, reporter: &Reporter<()>) -> Option<Simulated> {
+    let Question { robot, controller, trials } = question;
+    let mut watch =
+        || if reporter.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
+    let mut recoveries = [None; 3];
+    for (found, trial) in recoveries.iter_mut().zip(trials) {
+        *found = recovery(robot, controller, *trial, &mut watch).unwrap_or_default();
+    }
+    let largest_pitch_rad = largest_pitch(robot, controller, &mut watch).unwrap_or_default();
+    (!reporter.is_cancelled()).then_some(Simulated { recoveries, largest_pitch_rad })
+}
