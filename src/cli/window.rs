@@ -50,6 +50,7 @@ enum TabName {
     Experiments,
     Robot,
     Log,
+    Runs,
 }
 
 pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
@@ -64,6 +65,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
         (Some(TabName::Experiments), _) => Tab::Experiments,
         (Some(TabName::Robot), _) => Tab::Robot,
         (Some(TabName::Log), _) => Tab::Log,
+        (Some(TabName::Runs), _) => Tab::Runs,
         (Some(TabName::Tune), _) | (None, None) => Tab::Tune,
     };
     let options = WindowOptions {

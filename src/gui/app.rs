@@ -32,6 +32,7 @@ use crate::messages::{Messages, Severity};
 use crate::recent::{Recent, RecentFile};
 use crate::refine::{RefineCommand, RefineTab};
 use crate::robot::{Link, RobotTab, sentence};
+use crate::runs::RunsTab;
 use crate::session::Session;
 use crate::state_out::StateOut;
 use crate::tab::Tab;
@@ -68,8 +69,6 @@ pub struct App {
     asks_path: bool,
     leave_after_save: bool,
     leaving: bool,
-    /// Rows of the run ledger, as the session file has them.
-    runs: Option<serde_json::Value>,
     tour: Option<Tour>,
     tour_is_due: bool,
     model_path: Option<PathBuf>,
@@ -89,6 +88,7 @@ pub struct App {
     experiments: ExperimentsTab,
     link: Link,
     robot: RobotTab,
+    runs: RunsTab,
     commands: Commands,
     messages: Messages,
     recent: Recent,
@@ -120,9 +120,12 @@ impl App {
         let layout = Layout::new(options.tab);
         let experiments = ExperimentsTab::default();
         let base = Base { saved: session.clone(), path: options.model_path.clone() };
+        let mut designer = Designer::default();
+        designer.update(&session);
         let content = Content {
             session: session.clone(),
             base: 0,
+            comparison: designer.comparison(),
             experiment: experiments.settings().clone(),
             layout: layout.node(),
         };
@@ -137,7 +140,6 @@ impl App {
             asks_path: false,
             leave_after_save: false,
             leaving: false,
-            runs: None,
             tour: None,
             tour_is_due: options.tour,
             tune: TuneTab::new(&session, options.model_path.as_deref()),
@@ -148,7 +150,7 @@ impl App {
             palette: None,
             source: Source::default(),
             paused_before: options.paused,
-            designer: Designer::default(),
+            designer,
             live: Live::start(&waker, options.paused)?,
             history: History::default(),
             friction: FrictionTab::new(column_map.clone()),
@@ -156,6 +158,7 @@ impl App {
             experiments,
             link: Link::new(options.devices),
             robot: RobotTab::default(),
+            runs: RunsTab::default(),
             commands: Commands::default(),
             messages: Messages::default(),
             recent: Recent::default(),
@@ -169,7 +172,6 @@ impl App {
             frame_interval: Duration::from_millis(33),
             frame_cpu_s: None,
         };
-        app.designer.update(&app.session);
         app.reset_live();
         app.say_loaded();
         if let Some(log) = options.log {
@@ -263,6 +265,7 @@ impl App {
         };
         let (tune, friction, experiments) = (&mut self.tune, &mut self.friction, &mut self.experiments);
         let (refine, robot, messages) = (&mut self.refine, &mut self.robot, &mut self.messages);
+        let runs = &mut self.runs;
         let mut stop = false;
         let before = self.layout.shown().to_vec();
         let turned_to = self.layout.ui(ui, &mut |tab, ui| match tab {
@@ -271,6 +274,7 @@ impl App {
             Tab::Refine => refine.ui(&context, ui),
             Tab::Experiments => experiments.ui(&context, ui),
             Tab::Robot => stop |= robot.ui(&context, ui),
+            Tab::Runs => runs.ui(&context, ui),
             Tab::Log => messages.ui(ui),
         });
         let front = || self.layout.shown().first().copied().filter(|_| !self.layout.shows(self.tab));
@@ -309,6 +313,7 @@ impl App {
         if let Some(warning) = warnings.next_back() {
             self.fail(sentence(&warning.text));
         }
+        self.watch_recording();
         self.robot.drain();
         match message {
             None => {}
@@ -320,6 +325,13 @@ impl App {
             }
         }
         self.say_stage(before);
+    }
+
+    /// A recording that has ended is a run.
+    fn watch_recording(&mut self) {
+        let status = self.link.status.as_ref().filter(|_| self.link.is_open());
+        let recording = status.and_then(|status| status.recording.as_ref());
+        self.runs.watch(recording, self.source.name(), || self.session.model());
     }
 
     /// The status line must not say what was true of the stage before.
@@ -342,6 +354,10 @@ impl App {
             [self.friction.drain(), self.refine.drain(), self.experiments.drain()].into_iter().flatten()
         {
             self.say(message);
+        }
+        self.experiments.note_runs(&mut self.runs);
+        for run in [self.friction.take_finished(), self.refine.take_finished()].into_iter().flatten() {
+            self.runs.note(run);
         }
         for result in
             [self.experiments.drain_saver(&self.waker), self.refine.drain_saver()].into_iter().flatten()
@@ -519,6 +535,7 @@ impl App {
             "friction_tab": self.friction.snapshot(),
             "refine_tab": self.refine.snapshot(&self.session),
             "experiments_tab": self.experiments.snapshot(),
+            "runs_tab": self.runs.snapshot(),
             "robot_tab": self.robot.snapshot(&self.link),
             "message": self.messages.newest().map(|message| &message.text),
         })

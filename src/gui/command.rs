@@ -13,6 +13,7 @@ use crate::experiments::SavedAs;
 use crate::layout::Side;
 use crate::plot::FigureFile;
 use crate::refine::{RefineCommand, RefineFile};
+use crate::runs::RunsCommand;
 use crate::tab::Tab;
 
 /// Where measured values come from.
@@ -110,10 +111,6 @@ pub(crate) enum Command {
     Stop,
     SelectSource(Source),
     SetWeights(Weights),
-    /// A drag of a weight, or typing one, begins,
-    BeginWeightDrag,
-    /// and ends: what lies between is one change.
-    EndWeightDrag,
     /// Makes the other design of the comparison the one of now.
     KeepReference,
     /// The other design of the comparison comes into force, and the one of now is the other.
@@ -182,6 +179,8 @@ pub(crate) enum Command {
     ChooseRecording(PathBuf),
     /// Where a figure is saved to, or why no dialog has said so.
     ChooseFigure(FigureFile, Result<PathBuf, String>),
+    /// Changes the ledger of runs.
+    Runs(RunsCommand),
     /// One sentence for the status line.
     Say(String),
 }

@@ -49,6 +49,15 @@ impl Slot {
     }
 }
 
+/// How the two designs stand beside each other, for undo.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Comparison {
+    /// Of the other design.
+    pub(crate) weights: Option<Weights>,
+    /// Which of the two is in force.
+    pub(crate) active: Slot,
+}
+
 /// The design in force, the last problem, and the design to compare with.
 #[derive(Default)]
 pub(crate) struct Designer {
@@ -84,6 +93,19 @@ impl Designer {
         changed
     }
 
+    pub(crate) fn comparison(&self) -> Comparison {
+        Comparison { weights: self.reference.map(|reference| reference.weights), active: self.active }
+    }
+
+    /// Takes over how the two designs stood beside each other; the one in force stays.
+    pub(crate) fn compare(&mut self, comparison: Comparison) {
+        self.active = comparison.active;
+        if let (Some(in_force), Some(weights)) = (self.in_force, comparison.weights) {
+            self.reference =
+                Designed::solve(in_force.parameters, weights, in_force.timing).or(self.reference);
+        }
+    }
+
     /// The other design is one for the robot of now; at the start both are the same.
     fn follow_robot(&mut self, parameters: RobotParameters, timing: SampledLoop) {
         let Some(reference) = self.reference else {
@@ -91,9 +113,7 @@ impl Designer {
             return;
         };
         if (reference.parameters, reference.timing) != (parameters, timing) {
-            let again = design(&parameters.linear_model(), &reference.weights)
-                .map(|design| Designed::new(parameters, reference.weights, timing, design));
-            self.reference = again.ok().or(self.reference);
+            self.reference = Designed::solve(parameters, reference.weights, timing).or(self.reference);
         }
     }
 
@@ -136,6 +156,11 @@ impl Designer {
 }
 
 impl Designed {
+    fn solve(parameters: RobotParameters, weights: Weights, timing: SampledLoop) -> Option<Self> {
+        let design = design(&parameters.linear_model(), &weights).ok()?;
+        Some(Self::new(parameters, weights, timing, design))
+    }
+
     fn new(parameters: RobotParameters, weights: Weights, timing: SampledLoop, design: LqrDesign) -> Self {
         let margins = margins(&parameters.linear_model(), &design.gain, &timing);
         Self { parameters, weights, design, timing, margins }

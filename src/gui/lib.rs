@@ -33,6 +33,7 @@ mod quantity;
 mod recent;
 mod refine;
 pub mod robot;
+mod runs;
 mod session;
 mod shell_word;
 mod state_out;

@@ -14,14 +14,16 @@ pub enum Tab {
     Experiments,
     /// A real robot: connection, health, arming, recording.
     Robot,
+    /// The ledger of all runs.
+    Runs,
     /// Every message since the start.
     Log,
 }
 
 impl Tab {
     /// All, in the order in which they are offered; the first nine have the keys 1 to 9.
-    pub const ALL: [Self; 6] =
-        [Self::Tune, Self::Friction, Self::Refine, Self::Experiments, Self::Robot, Self::Log];
+    pub const ALL: [Self; 7] =
+        [Self::Tune, Self::Friction, Self::Refine, Self::Experiments, Self::Robot, Self::Runs, Self::Log];
 
     /// Name for people.
     pub fn title(self) -> &'static str {
@@ -31,6 +33,7 @@ impl Tab {
             Self::Refine => "Refine",
             Self::Experiments => "Experiments",
             Self::Robot => "Robot",
+            Self::Runs => "Runs",
             Self::Log => "Log",
         }
     }
@@ -43,6 +46,7 @@ impl Tab {
             Self::Refine => "What the model lacks, from measured logs",
             Self::Experiments => "LQR and FLQR side by side on the simulated robot",
             Self::Robot => "Connection, health, arming and recording of a robot",
+            Self::Runs => "All runs so far: over each other, and what changed between them",
             Self::Log => "Every message since the start",
         }
     }
@@ -55,6 +59,7 @@ impl Tab {
             Self::Refine => "refine",
             Self::Experiments => "experiments",
             Self::Robot => "robot",
+            Self::Runs => "runs",
             Self::Log => "log",
         }
     }
@@ -70,6 +75,7 @@ impl Tab {
             Self::Tune => 860.0,
             Self::Friction | Self::Refine | Self::Experiments => 900.0,
             Self::Robot => 640.0,
+            Self::Runs => 760.0,
             Self::Log => 240.0,
         }
     }

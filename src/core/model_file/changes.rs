@@ -1,6 +1,8 @@
 //! What differs between two models, key by key as their files would have it.
 
-use super::Model;
+use std::collections::BTreeSet;
+
+use super::{Entry, Model};
 
 /// A key that two models do not have alike.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -17,54 +19,14 @@ pub struct Change {
 impl Model {
     /// What is other in `new`, in the order of the keys.
     pub fn changes_to(&self, new: &Self) -> Vec<Change> {
-        let (old, new) = (leaves(self), leaves(new));
-        let value = |all: &[(String, String)], key: &str| {
-            all.iter().find(|(other, _)| other == key).map(|(_, value)| value.clone())
-        };
-        let mut changes: Vec<Change> = old
-            .iter()
-            .map(|(key, value_of_old)| Change {
-                key: key.clone(),
-                old: Some(value_of_old.clone()),
-                new: value(&new, key),
-            })
-            .collect();
-        let added = new.iter().filter(|(key, _)| value(&old, key).is_none());
-        changes.extend(added.map(|(key, value)| Change {
+        let (old, new) = (self.entries(), new.entries());
+        let keys: BTreeSet<&String> = old.keys().chain(new.keys()).collect();
+        let changes = keys.into_iter().map(|key| Change {
             key: key.clone(),
-            old: None,
-            new: Some(value.clone()),
-        }));
-        changes.retain(|change| change.old != change.new);
-        changes.sort_by(|a, b| a.key.cmp(&b.key));
-        changes
-    }
-}
-
-/// Keys with the values that are no tables.
-fn leaves(model: &Model) -> Vec<(String, String)> {
-    let table: toml::Table = model.to_toml().parse().expect("a model's own text is TOML");
-    let mut found = Vec::new();
-    collect(String::new(), &toml::Value::Table(table), &mut found);
-    found
-}
-
-fn collect(key: String, value: &toml::Value, found: &mut Vec<(String, String)>) {
-    match value {
-        toml::Value::Table(table) => {
-            for (name, value) in table {
-                let key = if key.is_empty() { name.clone() } else { format!("{key}.{name}") };
-                collect(key, value, found);
-            }
-        }
-        toml::Value::Array(array) => {
-            for (index, value) in array.iter().enumerate() {
-                collect(format!("{key}[{}]", index + 1), value, found);
-            }
-        }
-        toml::Value::String(text) => found.push((key, text.clone())),
-        toml::Value::Float(number) => found.push((key, number.to_string())),
-        other => found.push((key, other.to_string())),
+            old: old.get(key).map(Entry::to_string),
+            new: new.get(key).map(Entry::to_string),
+        });
+        changes.filter(|change| change.old != change.new).collect()
     }
 }
 

@@ -1,6 +1,7 @@
 //! A model as a flat list of what its file says, to tell two apart.
 
 use std::collections::BTreeMap;
+use std::fmt;
 
 use toml::Value;
 
@@ -13,6 +14,15 @@ pub enum Entry {
     Number(f64),
     /// Anything else, as it is written.
     Text(String),
+}
+
+impl fmt::Display for Entry {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Number(number) => number.fmt(f),
+            Self::Text(text) => text.fmt(f),
+        }
+    }
 }
 
 impl Model {

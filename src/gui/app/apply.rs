@@ -103,7 +103,6 @@ impl App {
                     robot.weights = Some(weights);
                 }
             }
-            Command::BeginWeightDrag | Command::EndWeightDrag => {}
             Command::KeepReference => self.designer.keep(),
             Command::SwapReference => self.swap_reference(),
             Command::RestoreReference => self.restore_reference(),
@@ -172,6 +171,11 @@ impl App {
             Command::ChooseReplay(path) => self.robot.form.replay = path.display().to_string(),
             Command::ChooseRecording(path) => self.robot.note_recording_path(&path),
             Command::ChooseFigure(file, answer) => file.answer(ctx, answer),
+            Command::Runs(command) => {
+                if let Some(text) = self.runs.apply(command) {
+                    self.say(text);
+                }
+            }
             Command::Say(text) => self.say(text),
         }
         ctx.request_repaint();
@@ -181,7 +185,7 @@ impl App {
         match self.tab {
             Tab::Experiments => self.experiments.focus_path(),
             Tab::Refine => self.refine.focus_path(),
-            Tab::Tune | Tab::Friction | Tab::Robot | Tab::Log => {
+            Tab::Tune | Tab::Friction | Tab::Robot | Tab::Runs | Tab::Log => {
                 self.commands.send(Command::SelectTab(Tab::Friction));
                 self.friction.focus_path();
             }
@@ -298,7 +302,7 @@ impl App {
     fn command_line(&self) -> Result<String, String> {
         let model = self.model_path_of_session();
         match self.tab {
-            Tab::Tune | Tab::Log => Ok(command_line::gains(model)),
+            Tab::Tune | Tab::Runs | Tab::Log => Ok(command_line::gains(model)),
             Tab::Friction => self.friction.command_line(model),
             Tab::Refine => self.refine.command_line(&self.session, model),
             Tab::Experiments => Ok(self.experiments.command_line(model)),

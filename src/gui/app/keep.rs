@@ -35,11 +35,13 @@ impl App {
         let now = self.undo.now();
         let is_same = now.base == self.base
             && now.session == self.session
+            && now.comparison == self.designer.comparison()
             && now.experiment == *self.experiments.settings()
             && now.layout.is_alike(&layout);
         let content = || Content {
             session: self.session.clone(),
             base: self.base,
+            comparison: self.designer.comparison(),
             experiment: self.experiments.settings().clone(),
             layout,
         };
@@ -69,6 +71,7 @@ impl App {
             self.designer.update(&self.session);
             self.send_robot();
         }
+        self.designer.compare(content.comparison);
         self.say(format!("{}: {name}.", if redo { "Done again" } else { "Undone" }));
     }
 
@@ -110,7 +113,7 @@ impl App {
             dark: Some(ctx.global_style().visuals.dark_mode),
             zoom: Some(ctx.zoom_factor()),
             degrees: Some(self.experiments.degrees()),
-            runs: self.runs.clone(),
+            runs: Some(self.runs.to_value()),
         }
     }
 
@@ -139,7 +142,9 @@ impl App {
         if let Some(value) = &document.connection {
             problems.extend(self.robot.form.take_value(value).err());
         }
-        self.runs = document.runs.clone().or(self.runs.take());
+        if let Some(value) = &document.runs {
+            problems.extend(self.runs.take_value(value).err());
+        }
         problems
     }
 

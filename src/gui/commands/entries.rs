@@ -76,7 +76,9 @@ fn file() -> Vec<Entry> {
                     Tab::Robot if s.source == Source::Replay => FilePurpose::OpenReplay,
                     Tab::Friction => FilePurpose::OpenLog,
                     Tab::Refine => FilePurpose::Refine(RefineFile::Log),
-                    Tab::Tune | Tab::Experiments | Tab::Robot | Tab::Log => FilePurpose::OpenModel,
+                    Tab::Tune | Tab::Experiments | Tab::Robot | Tab::Runs | Tab::Log => {
+                        FilePurpose::OpenModel
+                    }
                 }))
             },
         ),
@@ -220,14 +222,28 @@ fn edit() -> Vec<Entry> {
         entry(
             menu,
             "keep-a",
-            "Keep the gains as A",
-            "To compare later ones with",
+            "Keep the design to compare with",
+            "The other one of A and B becomes the one in force",
             &[],
             of_robot(Command::KeepReference),
         ),
-        entry(menu, "back-to-a", "Back to A", "Take the weights of A again", &[], |s| {
-            if s.has_reference { Ok(Command::RestoreReference) } else { Err("there is no A yet") }
+        entry(menu, "swap-designs", "Swap A and B", "The other design comes into force", &[], |s| {
+            if s.has_reference { Ok(Command::SwapReference) } else { Err("there is no other design yet") }
         }),
+        entry(
+            menu,
+            "back-to-a",
+            "Back to the other design",
+            "Take the weights of the other one of A and B",
+            &[],
+            |s| {
+                if s.has_reference {
+                    Ok(Command::RestoreReference)
+                } else {
+                    Err("there is no other design yet")
+                }
+            },
+        ),
         entry(menu, "controller-lqr", "Use LQR", "Gains alone", &[], |s| match s.controller {
             ControllerKind::Lqr => Err("it is in use"),
             ControllerKind::Flqr => Ok(Command::SetController(ControllerKind::Lqr)),
@@ -302,7 +318,7 @@ fn run() -> Vec<Entry> {
             "The fit, the search or the experiment; connects or disconnects on the Robot page",
             &[ctrl(Key::Enter)],
             |s| match s.tab {
-                Tab::Tune | Tab::Log => Err("this page starts nothing"),
+                Tab::Tune | Tab::Runs | Tab::Log => Err("this page starts nothing"),
                 Tab::Friction => start_fit(s),
                 Tab::Refine => Ok(start_refine(s)),
                 Tab::Experiments => Ok(start_experiment(s)),

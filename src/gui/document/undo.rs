@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use flqr_core::model_file::Change;
 
+use crate::design::Comparison;
 use crate::experiments::Settings;
 use crate::layout::Node;
 use crate::session::Session;
@@ -17,6 +18,7 @@ pub(crate) struct Content {
     pub(crate) session: Session,
     /// Which of the loaded models it was made from.
     pub(crate) base: usize,
+    pub(crate) comparison: Comparison,
     pub(crate) experiment: Settings,
     pub(crate) layout: Node,
 }
@@ -26,6 +28,7 @@ impl Content {
     fn is_alike(&self, other: &Self) -> bool {
         self.base == other.base
             && self.session == other.session
+            && self.comparison == other.comparison
             && self.experiment == other.experiment
             && self.layout.is_alike(&other.layout)
     }
@@ -155,6 +158,9 @@ fn describe(old: &Content, new: &Content) -> String {
     if old.experiment != new.experiment {
         return "experiment".to_owned();
     }
+    if old.comparison != new.comparison {
+        return "designs A and B".to_owned();
+    }
     "layout".to_owned()
 }
 
@@ -206,7 +212,16 @@ mod tests {
         let session = Session::new(presets::paper(), ControllerKind::Flqr);
         let base = Base { saved: session.clone(), path: None };
         let layout = Node::default();
-        Undo::new(Content { session, base: 0, experiment: Settings::default(), layout }, base)
+        Undo::new(
+            Content {
+                session,
+                base: 0,
+                comparison: Comparison::default(),
+                experiment: Settings::default(),
+                layout,
+            },
+            base,
+        )
     }
 
     fn with_weight(undo: &Undo, pitch: f64) -> Content {

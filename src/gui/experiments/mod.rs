@@ -3,6 +3,7 @@
 
 mod dials;
 mod form;
+mod ledger;
 mod playback;
 mod plots;
 mod preflight;
@@ -27,6 +28,7 @@ use crate::command::{Commands, FilePurpose};
 use crate::context::ViewContext;
 use crate::job::Waker;
 use crate::plot::Marks;
+use crate::runs::RunsTab;
 use crate::theme::palette;
 use crate::widgets::{error_ui, hint_ui, section_ui, warning_ui};
 use dials::{Dials, GREATEST_HEIGHT};
@@ -166,6 +168,13 @@ impl ExperimentsTab {
     /// A sentence when something was saved, or could not be.
     pub(crate) fn drain_saver(&mut self, waker: &Waker) -> Option<Result<String, String>> {
         self.saver.drain(waker)
+    }
+
+    /// Gives the runs that have just ended their rows in the ledger.
+    pub(crate) fn note_runs(&self, runs: &mut RunsTab) {
+        if let Some(comparison) = self.runs.comparison() {
+            comparison.note_in(runs);
+        }
     }
 
     pub(crate) fn cancel(&self) {
@@ -335,6 +344,9 @@ impl ExperimentsTab {
         for (variant, _) in comparison.recorded() {
             legend_ui(ui, variant.title(settings.scenario), colors.runs[variant as usize]);
         }
+        if ui.available_width() >= 420.0 {
+            hint_ui(ui, comparison.numbers_text()).on_hover_text("Rows of these runs on the Runs tab");
+        }
         if comparison.signals(false).iter().any(|signal| signal.has_target) {
             legend_ui(ui, "target", colors.reference);
         }
@@ -408,6 +420,7 @@ fn snapshot_of(
         "end_s": run.end_s(),
         "warnings": run.warnings(),
         "command": comparison.command_line(variant),
+        "run": comparison.provenance(variant),
     })
 }
 

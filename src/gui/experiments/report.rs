@@ -29,6 +29,10 @@ pub(super) fn document(comparison: &Comparison, range_s: [f64; 2]) -> Document {
     )));
     let items = Variant::ALL.map(|variant| comparison.command_line(variant)).to_vec();
     blocks.push(Block::List { numbered: false, items });
+    let rows = comparison.provenances();
+    if !rows.is_empty() {
+        blocks.push(Block::paragraph(format!("In the ledger of the session: {}.", rows.join("; "))));
+    }
     blocks.push(Block::part("The model"));
     let lines = comparison.model.to_toml();
     let lines = lines.lines().filter(|line| !line.trim().is_empty()).map(str::to_owned);
@@ -57,10 +61,11 @@ pub(super) fn chart(comparison: &Comparison, range_s: [f64; 2]) -> Chart {
     };
     let names: Vec<_> = comparison.recorded().map(|(variant, _)| variant.title(scenario)).collect();
     let plotted: Vec<_> = signals.iter().map(|signal| signal.quantity.name).collect();
+    let rows: String = comparison.provenances().iter().map(|row| format!(" Of {row}.")).collect();
     Chart {
         title: format!("{}, {}", scenario.title(), names.join(" and ")),
         description: format!(
-            "{} over time, from {} to {} s.",
+            "{} over time, from {} to {} s.{rows}",
             sentence_case(&plotted.join(", ")),
             number::significant(range_s[0], 4),
             number::significant(range_s[1], 4)

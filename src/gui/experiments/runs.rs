@@ -1,7 +1,7 @@
 //! Both runs in the background, and what came of the last two.
 
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use flqr_core::model_file::{Model, Rig};
 use flqr_core::simulate::Summary;
@@ -9,6 +9,7 @@ use flqr_core::simulate::Summary;
 use super::run::{End, Recorded, Settings, Variant, command_line, run};
 use super::signals::{Signal, signals};
 use crate::job::{Job, Outcome, Reporter, Waker};
+use crate::runs::Run;
 
 /// What the last two runs were made with, and what came of them.
 #[derive(Debug)]
@@ -21,6 +22,8 @@ pub(super) struct Comparison {
     pub(super) runs: [Result<Box<Recorded>, String>; 2],
     /// Differs from that of any other comparison.
     pub(super) generation: u64,
+    /// The rows of the runs in the ledger, once they have them.
+    pub(super) rows: OnceLock<Vec<(Variant, Run)>>,
 }
 
 impl Comparison {
@@ -171,7 +174,8 @@ impl Runs {
             End::Cancelled => unreachable!("a cancelled run ends both"),
         });
         self.generation += 1;
-        let comparison = Comparison { settings, model, model_path, runs, generation: self.generation };
+        let rows = OnceLock::new();
+        let comparison = Comparison { settings, model, model_path, runs, generation: self.generation, rows };
         let message = summary(&comparison);
         self.comparison = Some(Arc::new(comparison));
         Some(message)

@@ -288,6 +288,9 @@ fn logs(path: &Path, comparison: &Comparison) -> Result<Vec<(PathBuf, Vec<u8>)>,
     for (variant, run) in comparison.recorded() {
         for (suffix, log) in run.logs() {
             let mut text = Vec::new();
+            if let Some(row) = comparison.provenance(variant) {
+                text.extend_from_slice(format!("# {row}\n").as_bytes());
+            }
             write_log(&log, &mut text).map_err(|error| format!("the log has no text: {error}"))?;
             files.push((log_path(path, variant.name(comparison.settings.scenario), suffix), text));
         }

@@ -7,14 +7,15 @@ use egui::{ProgressBar, RichText, TextEdit, Ui};
 use flqr_core::friction::{Stribeck, StribeckParameters};
 use flqr_core::identify::{Bounds, FitOptions, FitProgress, FitReport, Method, Motor, fit};
 use flqr_core::model_file::{AxisParameters, Model, Rig};
-use flqr_core::record::{LogKind, Mapping};
+use flqr_core::record::{Log, LogKind, Mapping};
 
 use super::fitted::Fitted;
 use crate::command::Command;
 use crate::context::ViewContext;
 use crate::job::{Job, Outcome, Waker};
 use crate::load::LoadedLog;
-use crate::widgets::{choice_ui, error_ui, hint_ui, section_ui};
+use crate::runs::{Run, RunKind, Value};
+use crate::widgets::{choice_ui, error_ui, hint_ui, section_ui, shown};
 
 /// One report of the optimiser.
 #[derive(Clone, Copy)]
@@ -41,6 +42,9 @@ pub(super) struct FitRun {
     pub(super) convergence: Vec<[f64; 2]>,
     last_step: Option<Step>,
     pub(super) report: Option<FitReport>,
+    made_with: Option<MadeWith>,
+    /// The row of a fit that has ended, until the ledger takes it.
+    pub(super) finished: Option<Run>,
     problem: Option<String>,
 }
 
@@ -58,8 +62,40 @@ impl Default for FitRun {
             convergence: Vec::new(),
             last_step: None,
             report: None,
+            made_with: None,
+            finished: None,
             problem: None,
         }
+    }
+}
+
+/// What a fit is made with, for its row in the ledger.
+struct MadeWith {
+    log: Arc<Log>,
+    model: Option<Model>,
+    motor: Motor,
+    options: FitOptions,
+}
+
+impl MadeWith {
+    fn row(&self, report: &FitReport) -> Run {
+        let Self { log, model, motor, options } = self;
+        let name = Path::new(&log.source)
+            .file_name()
+            .map_or(log.source.as_str().into(), |name| name.to_string_lossy());
+        let motor = if *motor == Motor::Left { "left" } else { "right" };
+        let method = if options.method == Method::Best { "best" } else { "pso" };
+        let mut row = Run::new(RunKind::Fit, format!("friction, {motor}, {name}"), model.as_ref(), &[log])
+            .with("fit.log", Value::Text(log.source.clone()))
+            .with("fit.motor", Value::Text(motor.to_owned()))
+            .with("fit.method", Value::Text(method.to_owned()))
+            .with("fit.seed", Value::Number(options.seed as f64));
+        let mut result = format!("error {} {}", shown(report.rmse, 3), report.rmse_unit);
+        for (key, estimate) in &report.parameters {
+            row = row.with(&format!("result.{key}"), Value::Number(estimate.value));
+            result += &format!(", {key} {}", shown(estimate.value, 3));
+        }
+        Run { seed: Some(options.seed), result, ..row }
     }
 }
 
@@ -82,6 +118,8 @@ impl FitRun {
         self.held = model.is_some();
         let motor = self.motor;
         let options = self.options();
+        let made_with =
+            MadeWith { log: Arc::clone(&log), model: model.clone(), motor, options: options.clone() };
         let work = move |reporter: &crate::job::Reporter<Step>| {
             let mut watch = |progress: &FitProgress| {
                 reporter.progress(Step {
@@ -95,6 +133,7 @@ impl FitRun {
                 .map_err(|error| error.to_string())
         };
         self.job = Some(Job::start("fit", waker, work).map_err(|e| format!("No thread for the fit: {e}."))?);
+        self.made_with = Some(made_with);
         Ok(())
     }
 
@@ -148,6 +187,7 @@ impl FitRun {
                 let text =
                     format!("The fit ended with an error of {:.3e} {}.", report.rmse, report.rmse_unit);
                 self.show_history(&report);
+                self.finished = self.made_with.take().map(|made_with| made_with.row(&report));
                 self.report = Some(report);
                 text
             }

@@ -121,6 +121,11 @@ impl FrictionTab {
         self.fit.drain().or(loaded)
     }
 
+    /// The row of a fit that has just ended.
+    pub(crate) fn take_finished(&mut self) -> Option<crate::runs::Run> {
+        self.fit.finished.take()
+    }
+
     pub(crate) fn snapshot(&self) -> serde_json::Value {
         serde_json::json!({ "log": self.loader.snapshot(), "fit": self.fit.snapshot() })
     }

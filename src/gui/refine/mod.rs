@@ -6,6 +6,7 @@ mod compare;
 mod effects;
 mod form;
 mod health;
+mod ledger;
 mod residual;
 mod run;
 mod save;
@@ -50,6 +51,8 @@ pub(crate) struct RefineTab {
     ticked: u64,
     /// The refined model with the effects that are ticked.
     chosen: Option<Model>,
+    /// The refinement that the ledger has.
+    noted: Option<u64>,
 }
 
 /// What the page's commands may use of the window.
@@ -92,6 +95,7 @@ impl RefineTab {
             ticks: Vec::new(),
             ticked: 0,
             chosen: None,
+            noted: None,
         }
     }
 

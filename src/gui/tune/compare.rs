@@ -97,19 +97,15 @@ fn differences(a: &Designed, b: &Designed, peaks: [f64; 2]) -> Vec<Difference> {
     };
     const STATES: [&str; 4] = ["displacement", "velocity", "pitch", "pitch rate"];
     const MOTORS: [&str; 2] = ["left", "right"];
-    for row in 0..4 {
-        for column in row..4 {
-            let name = if row == column {
-                format!("Q {}", STATES[row])
-            } else {
-                format!("Q {}, {}", STATES[row], STATES[column])
-            };
+    for (row, state) in STATES.into_iter().enumerate() {
+        for (column, other) in STATES.into_iter().enumerate().skip(row) {
+            let name = if row == column { format!("Q {state}") } else { format!("Q {state}, {other}") };
             add(name, a.weights.q[(row, column)], b.weights.q[(row, column)]);
         }
     }
-    for row in 0..2 {
-        for column in row..2 {
-            let name = if row == column { format!("R {}", MOTORS[row]) } else { "R left, right".to_owned() };
+    for (row, motor) in MOTORS.into_iter().enumerate() {
+        for column in row..MOTORS.len() {
+            let name = if row == column { format!("R {motor}") } else { "R left, right".to_owned() };
             add(name, a.weights.r[(row, column)], b.weights.r[(row, column)]);
         }
     }

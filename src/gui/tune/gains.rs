@@ -10,8 +10,6 @@ use crate::design::Designed;
 use crate::theme::palette;
 use crate::widgets::{choice_ui, error_ui, hint_ui, mono, number_ui, section_ui, shown, warning_ui};
 
-use super::weights::note_edit;
-
 /// Gains of the states, with their units.
 const COLUMNS: [(&str, &str); 4] = [
     ("displ.", "N m per m of displacement"),
@@ -103,8 +101,8 @@ pub(super) fn feedforward_ui(context: &ViewContext<'_>, ui: &mut Ui) {
         Grid::new("compensation").num_columns(4).spacing([8.0, 4.0]).show(ui, |ui| {
             ui.label("ratio").on_hover_text("Share of the friction that is compensated");
             let slider = ui.add(Slider::new(&mut compensation.ratio, 0.0..=1.5).show_value(false));
-            note_edit(context, &slider.accessible_name("compensation ratio slider"));
-            note_edit(context, &number_ui(ui, &mut compensation.ratio, "compensation ratio", 58.0));
+            slider.accessible_name("compensation ratio slider");
+            number_ui(ui, &mut compensation.ratio, "compensation ratio", 58.0);
             ui.label("");
             ui.end_row();
             ui.label("smoothing").on_hover_text(
@@ -114,9 +112,8 @@ pub(super) fn feedforward_ui(context: &ViewContext<'_>, ui: &mut Ui) {
                 .logarithmic(true)
                 .clamping(SliderClamping::Never)
                 .show_value(false);
-            note_edit(context, &ui.add(slider).accessible_name("smoothing speed slider"));
-            let field = number_ui(ui, &mut compensation.smoothing_speed_rad_s, "smoothing speed", 58.0);
-            note_edit(context, &field);
+            ui.add(slider).accessible_name("smoothing speed slider");
+            number_ui(ui, &mut compensation.smoothing_speed_rad_s, "smoothing speed", 58.0);
             ui.label(RichText::new("rad/s").monospace());
             ui.end_row();
         });

@@ -39,7 +39,7 @@ pub(super) fn ui(designed: &Designed, poles: &[SampledPole], ui: &mut Ui) {
         return;
     }
     let rows = rows(designed);
-    Grid::new("margins").num_columns(3).spacing([8.0, 2.0]).show(ui, |ui| {
+    Grid::new("margins").num_columns(3).min_col_width(14.0).spacing([8.0, 2.0]).show(ui, |ui| {
         for row in &rows {
             row.verdict.mark_ui(ui, row.name);
             ui.label(row.name).on_hover_text(row.help);

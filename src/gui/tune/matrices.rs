@@ -4,23 +4,20 @@ use egui::Ui;
 use flqr_core::lqr::Weights;
 use nalgebra::SMatrix;
 
-use super::weights::note_edit;
-use crate::context::ViewContext;
 use crate::widgets::{hint_ui, number_ui};
 
 const STATES: [&str; 4] = ["displacement", "velocity", "pitch", "pitch rate"];
 const MOTORS: [&str; 2] = ["left", "right"];
 
 /// Edits both matrices; they stay symmetric by construction.
-pub(super) fn matrices_ui(context: &ViewContext<'_>, ui: &mut Ui, weights: &mut Weights) {
+pub(super) fn matrices_ui(ui: &mut Ui, weights: &mut Weights) {
     hint_ui(ui, "Q in SI units, symmetric: one entry changes its mirror image too");
-    symmetric_ui(context, ui, "Q", STATES, &mut weights.q);
+    symmetric_ui(ui, "Q", STATES, &mut weights.q);
     hint_ui(ui, "R, 1/(N m)²");
-    symmetric_ui(context, ui, "R", MOTORS, &mut weights.r);
+    symmetric_ui(ui, "R", MOTORS, &mut weights.r);
 }
 
 fn symmetric_ui<const N: usize>(
-    context: &ViewContext<'_>,
     ui: &mut Ui,
     letter: &str,
     names: [&str; N],
@@ -36,7 +33,7 @@ fn symmetric_ui<const N: usize>(
             hint_ui(ui, *row_name);
             for (column, column_name) in names.iter().enumerate() {
                 let mut value = matrix[(row, column)];
-                if entry_ui(context, ui, &mut value, &format!("{letter} {row_name}, {column_name}")) {
+                if entry_ui(ui, &mut value, &format!("{letter} {row_name}, {column_name}")) {
                     matrix[(row, column)] = value;
                     matrix[(column, row)] = value;
                 }
@@ -46,9 +43,8 @@ fn symmetric_ui<const N: usize>(
     });
 }
 
-fn entry_ui(context: &ViewContext<'_>, ui: &mut Ui, value: &mut f64, name: &str) -> bool {
+fn entry_ui(ui: &mut Ui, value: &mut f64, name: &str) -> bool {
     let before = *value;
-    let field = number_ui(ui, value, name, 46.0).on_hover_text(name);
-    note_edit(context, &field);
+    number_ui(ui, value, name, 46.0).on_hover_text(name);
     *value != before
 }

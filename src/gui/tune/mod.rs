@@ -131,8 +131,8 @@ impl TuneTab {
         Panel::left("weights")
             .frame(side)
             .resizable(true)
-            .default_size(366.0)
-            .size_range(350.0..=480.0)
+            .default_size(350.0)
+            .size_range(340.0..=480.0)
             .show(ui, |ui| {
                 ScrollArea::vertical().show(ui, |ui| {
                     self.design_ui(context, ui);

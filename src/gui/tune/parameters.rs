@@ -8,7 +8,6 @@ use flqr_core::friction::{Stribeck, StribeckParameters};
 use flqr_core::model_file::presets;
 use flqr_core::robot::RobotParameters;
 
-use super::weights::note_edit;
 use crate::command::Command;
 use crate::context::ViewContext;
 use crate::session::Session;
@@ -95,7 +94,6 @@ impl ParameterEditor {
             for (key, name, unit, help, value) in ROBOT_FIELDS {
                 ui.label(name).on_hover_text(help);
                 let field = number_ui(ui, value(robot), &format!("{name} value"), 64.0);
-                note_edit(context, &field);
                 field.on_hover_text(help);
                 ui.label(unit);
                 ui.end_row();
@@ -116,7 +114,7 @@ impl ParameterEditor {
                 self.torque_limit_nm = limited.then(|| FIRST_VALUES.torque_limit_nm);
             }
             if let Some(limit) = &mut self.torque_limit_nm {
-                note_edit(context, &number_ui(ui, limit, "torque limit value", 64.0));
+                number_ui(ui, limit, "torque limit value", 64.0);
                 ui.label("N m");
             }
         });
@@ -147,7 +145,6 @@ impl ParameterEditor {
                         Some(curve) => {
                             let accessible = format!("{name} friction {side}");
                             let field = number_ui(ui, value(curve), &accessible, 54.0);
-                            note_edit(context, &field);
                             field.on_hover_text(format!("{help}, {side} motor [{unit}]"));
                         }
                         None => {

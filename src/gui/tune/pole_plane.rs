@@ -12,6 +12,8 @@ use crate::widgets::{choice_ui, shown};
 
 /// Dampings that are drawn as lines.
 const DAMPINGS: [f64; 4] = [0.3, 0.5, 0.7, 0.9];
+/// Rays from this damping on have their names beside them.
+const NAMED: f64 = 0.5;
 /// Poles that set the view: the plant's own are the slowest.
 const PLANTS: usize = 4;
 /// From the pointer to a pole that is told of, points.
@@ -174,8 +176,10 @@ fn rate_lines(plot_ui: &mut PlotUi<'_>, bounds: &PlotBounds, color: Color32) {
             let end = [-length, sign * length * slope];
             dashed(plot_ui, vec![[0.0, 0.0], end], faint);
         }
-        let at = [-0.93 * length, 0.93 * length * slope];
-        text(plot_ui, at, &format!("{damping}"), color);
+        // Steep rays lie too close to each other for their names.
+        if damping >= NAMED {
+            text(plot_ui, [-0.82 * length, 0.82 * length * slope], &format!("ζ {damping}"), color);
+        }
     }
     let rough = -left / 3.0;
     let power = 10.0_f64.powf(rough.log10().floor());

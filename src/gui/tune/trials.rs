@@ -69,6 +69,14 @@ struct Question {
     trials: [Disturbance; 3],
 }
 
+/// Peak torques of the design in force and of the other, N m.
+#[derive(Clone, Copy)]
+struct Peaks {
+    trials: [Disturbance; 3],
+    designs: [Option<Designed>; 2],
+    peaks_nm: [[f64; 3]; 2],
+}
+
 /// Disturbances to try, and what is known of them.
 pub(super) struct Trials {
     trials: [Disturbance; 3],
@@ -77,8 +85,7 @@ pub(super) struct Trials {
     asked: Option<Question>,
     job: Option<Job<(), Option<Simulated>>>,
     answer: Option<Simulated>,
-    /// Peak torques of the design in force and of the other, N m.
-    peaks: Option<([Disturbance; 3], [Option<Designed>; 2], [[f64; 3]; 2])>,
+    peaks: Option<Peaks>,
 }
 
 impl Default for Trials {
@@ -130,16 +137,16 @@ impl Trials {
 
     fn peaks_nm(&mut self, context: &ViewContext<'_>) -> [[f64; 3]; 2] {
         let designs = [context.designer.in_force, context.designer.reference];
-        if let Some((trials, of, peaks)) = &self.peaks
-            && (trials, of) == (&self.trials, &designs)
+        if let Some(known) = &self.peaks
+            && (known.trials, known.designs) == (self.trials, designs)
         {
-            return *peaks;
+            return known.peaks_nm;
         }
-        let peaks = designs.map(|designed| {
+        let peaks_nm = designs.map(|designed| {
             self.trials.map(|trial| designed.map_or(f64::NAN, |designed| peak_nm(&designed, trial)))
         });
-        self.peaks = Some((self.trials, designs, peaks));
-        peaks
+        self.peaks = Some(Peaks { trials: self.trials, designs, peaks_nm });
+        peaks_nm
     }
 
     pub(super) fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
@@ -154,7 +161,7 @@ impl Trials {
             );
         });
         let [peaks, _] = self.peaks_nm(context);
-        Grid::new("trials").num_columns(5).spacing([6.0, 3.0]).show(ui, |ui| {
+        Grid::new("trials").num_columns(5).min_col_width(14.0).spacing([6.0, 3.0]).show(ui, |ui| {
             for (index, kind) in KINDS.iter().enumerate() {
                 let verdict = self.verdict(index, peaks[index], limit_nm);
                 verdict.mark_ui(ui, kind.name);
@@ -260,7 +267,7 @@ impl Trials {
     pub(super) fn snapshot(&self) -> serde_json::Value {
         let recoveries = self.answer.as_ref().map(|answer| answer.recoveries.map(|r| r.map(|r| r.upright)));
         serde_json::json!({
-            "peak_torque_nm": self.peaks.as_ref().map(|(_, _, [peaks, _])| peaks),
+            "peak_torque_nm": self.peaks.map(|known| known.peaks_nm[0]),
             "upright": recoveries,
             "largest_pitch_rad": self.answer.as_ref().and_then(|answer| answer.largest_pitch_rad),
         })

@@ -49,7 +49,8 @@ impl Verdict {
         match self {
             Self::Good => ui.painter().circle_filled(center, 4.5, color),
             Self::Tight => {
-                let corners = [vec2(0.0, -5.5), vec2(5.5, 4.5), vec2(-5.5, 4.5)].map(|corner| center + corner);
+                let corners =
+                    [vec2(0.0, -5.5), vec2(5.5, 4.5), vec2(-5.5, 4.5)].map(|corner| center + corner);
                 ui.painter().add(Shape::convex_polygon(corners.to_vec(), color, Stroke::NONE))
             }
             Self::Bad => ui.painter().rect_filled(Rect::from_center_size(center, vec2(9.0, 9.0)), 1.0, color),

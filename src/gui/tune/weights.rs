@@ -1,6 +1,6 @@
 //! The Q/R editor: one row a weight, with the deviation that it makes count as 1.
 
-use egui::{Button, Response, Slider, SliderClamping, Ui};
+use egui::{Button, Slider, SliderClamping, Ui};
 use flqr_core::lqr::Weights;
 
 use super::matrices::matrices_ui;
@@ -82,7 +82,7 @@ impl WeightEditor {
             hint_ui(ui, "Entries off the diagonals follow these weights: see “Full matrices”.");
         }
         if self.full_matrices {
-            matrices_ui(context, ui, &mut weights);
+            matrices_ui(ui, &mut weights);
         }
         if weights != before {
             context.commands.send(Command::SetWeights(weights));
@@ -103,7 +103,7 @@ impl WeightEditor {
                 let focus = index == 0 && std::mem::take(&mut self.focus_first);
                 let before = weights.q[(index, index)];
                 let mut weight = before;
-                self.row_ui(context, ui, row, (&mut weight, saved.q[(index, index)]), focus);
+                self.row_ui(ui, row, (&mut weight, saved.q[(index, index)]), focus);
                 if weight != before {
                     weights.set_state_weight(index, weight);
                 }
@@ -111,7 +111,7 @@ impl WeightEditor {
             let old = [weights.r[(0, 0)], weights.r[(1, 1)]];
             for (index, row) in R_ROWS.iter().enumerate() {
                 let entry = (index, index);
-                self.row_ui(context, ui, row, (&mut weights.r[entry], saved.r[entry]), false);
+                self.row_ui(ui, row, (&mut weights.r[entry], saved.r[entry]), false);
             }
             if self.link_motors {
                 link(weights, old);
@@ -119,14 +119,7 @@ impl WeightEditor {
         });
     }
 
-    fn row_ui(
-        &self,
-        context: &ViewContext<'_>,
-        ui: &mut Ui,
-        row: &Row,
-        (weight, saved): (&mut f64, f64),
-        focus: bool,
-    ) {
+    fn row_ui(&self, ui: &mut Ui, row: &Row, (weight, saved): (&mut f64, f64), focus: bool) {
         ui.label(row.name).on_hover_text(row.help);
         ui.spacing_mut().slider_width = 58.0;
         let slider = Slider::new(weight, SMALLEST..=LARGEST)
@@ -135,20 +128,18 @@ impl WeightEditor {
             .clamping(SliderClamping::Never)
             .show_value(false);
         let slider = ui.add(slider).accessible_name(format!("{} weight slider", row.name));
-        note_edit(context, &slider);
         slider.on_hover_text(row.help);
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 2.0;
             self.step_ui(ui, row, weight, Step::Down);
             let field = number_ui(ui, weight, &format!("{} weight", row.name), 52.0);
-            note_edit(context, &field);
             if focus {
                 field.request_focus();
             }
             field.on_hover_text(row.help);
             self.step_ui(ui, row, weight, Step::Up);
         });
-        deviation_ui(context, ui, row, weight);
+        deviation_ui(ui, row, weight);
         let changed = *weight != saved;
         let reset = ui.add_enabled(changed, Button::new("↺").small().frame(false));
         let reset = reset.accessible_name(format!("reset {} weight", row.name));
@@ -189,7 +180,7 @@ fn link(weights: &mut Weights, old: [f64; 2]) {
 }
 
 /// The deviation that counts as 1, as another way to say the weight.
-fn deviation_ui(context: &ViewContext<'_>, ui: &mut Ui, row: &Row, weight: &mut f64) {
+fn deviation_ui(ui: &mut Ui, row: &Row, weight: &mut f64) {
     let before = 1.0 / weight.sqrt() / row.unit_si;
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 3.0;
@@ -199,7 +190,6 @@ fn deviation_ui(context: &ViewContext<'_>, ui: &mut Ui, row: &Row, weight: &mut 
         }
         let mut deviation = before;
         let field = number_ui(ui, &mut deviation, &format!("{} deviation", row.name), 46.0);
-        note_edit(context, &field);
         field.on_hover_text(format!(
             "The deviation of {} that counts as 1: weight = 1/deviation², in SI units",
             row.name
@@ -209,14 +199,4 @@ fn deviation_ui(context: &ViewContext<'_>, ui: &mut Ui, row: &Row, weight: &mut 
             *weight = (deviation * row.unit_si).powi(-2);
         }
     });
-}
-
-/// Tells where one change of a value begins and ends, be it dragged or typed.
-pub(super) fn note_edit(context: &ViewContext<'_>, response: &Response) {
-    if response.drag_started() || response.gained_focus() {
-        context.commands.send(Command::BeginWeightDrag);
-    }
-    if response.drag_stopped() || response.lost_focus() {
-        context.commands.send(Command::EndWeightDrag);
-    }
 }

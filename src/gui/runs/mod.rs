@@ -1,0 +1,174 @@
+//! The *Runs* page: the ledger of everything that was simulated, fitted, recorded and refined; rows over each
+//! other, and what changed between two.
+
+mod changes;
+mod command;
+mod overlay;
+mod run;
+mod table;
+mod watch;
+
+use std::collections::BTreeSet;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use egui::{CentralPanel, Frame, Margin, Panel, Ui};
+use flqr_core::device::RecordingStatus;
+use flqr_core::model_file::Model;
+
+use crate::context::ViewContext;
+use crate::widgets::hint_ui;
+use changes::Changes;
+pub(crate) use command::RunsCommand;
+use overlay::Overlay;
+pub(crate) use run::{Channel, Ledger, Run, RunKind, Series, Value};
+use table::RunTable;
+use watch::RecordingWatch;
+
+/// The ledger and how it is looked at.
+#[derive(Default)]
+pub(crate) struct RunsTab {
+    ledger: Ledger,
+    /// What was taken out, newest last.
+    deleted: Vec<Vec<Run>>,
+    /// Rows that are drawn.
+    ticked: BTreeSet<u64>,
+    table: RunTable,
+    overlay: Overlay,
+    changes: Changes,
+    recording: RecordingWatch,
+}
+
+impl RunsTab {
+    /// Adds a row; its number is for everything that is exported of the run.
+    pub(crate) fn note(&mut self, run: Run) -> u64 {
+        let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
+        self.ledger.add(run, now)
+    }
+
+    /// Takes note of how the recording stands; adds a row once it has ended. `model` is that of the robot.
+    pub(crate) fn watch(
+        &mut self,
+        now: Option<&RecordingStatus>,
+        source: &str,
+        model: impl FnOnce() -> Model,
+    ) {
+        if let Some(ended) = self.recording.note(now) {
+            self.note(watch::row(&ended, source, &model()));
+        }
+    }
+
+    /// Changes the ledger; a sentence where there is something to say.
+    pub(crate) fn apply(&mut self, command: RunsCommand) -> Option<String> {
+        match command {
+            RunsCommand::Delete(numbers) => {
+                let rows: Vec<Run> =
+                    numbers.iter().filter_map(|number| self.ledger.remove(*number)).collect();
+                self.ticked.retain(|number| !numbers.contains(number));
+                if rows.is_empty() {
+                    return None;
+                }
+                let text = format!(
+                    "Deleted {}: Undo delete brings it back.",
+                    listed(rows.iter().map(|row| row.number))
+                );
+                self.deleted.push(rows);
+                Some(text)
+            }
+            RunsCommand::UndoDelete => {
+                let rows = self.deleted.pop()?;
+                let text = format!("{} is back.", listed(rows.iter().map(|row| row.number)));
+                rows.into_iter().for_each(|row| self.ledger.put_back(row));
+                Some(text)
+            }
+            RunsCommand::SetNote(number, note) => {
+                self.ledger.row_mut(number)?.note = note;
+                None
+            }
+        }
+    }
+
+    /// What the session's file keeps.
+    pub(crate) fn to_value(&self) -> serde_json::Value {
+        self.ledger.to_value()
+    }
+
+    /// Shows the rows that a session's file has kept.
+    ///
+    /// # Errors
+    /// A sentence about what of them cannot be read.
+    pub(crate) fn take_value(&mut self, value: &serde_json::Value) -> Result<(), String> {
+        let result = self.ledger.take_value(value);
+        self.ticked.retain(|number| self.ledger.row(*number).is_some());
+        self.deleted.clear();
+        result
+    }
+
+    /// What the page shows, as `--state-out` writes it.
+    pub(crate) fn snapshot(&self) -> serde_json::Value {
+        let rows: Vec<_> = self
+            .ledger
+            .rows()
+            .iter()
+            .map(|run| {
+                serde_json::json!({
+                    "number": run.number,
+                    "kind": run.kind,
+                    "title": run.title,
+                    "seed": run.seed,
+                    "sources": run.sources,
+                    "weights": run.weights(),
+                    "result": run.result,
+                    "note": run.note,
+                })
+            })
+            .collect();
+        serde_json::json!({
+            "rows": rows,
+            "shown": self.ticked,
+            "shifts_s": self.overlay.shifts_s(),
+            "can_undo_delete": !self.deleted.is_empty(),
+        })
+    }
+
+    pub(crate) fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
+        let frame = Frame::central_panel(ui.style()).inner_margin(Margin::symmetric(10, 6));
+        if self.ledger.rows().is_empty() && self.deleted.is_empty() {
+            CentralPanel::default().frame(frame).show(ui, empty_ui);
+            return;
+        }
+        let height = (0.42 * ui.available_height()).max(140.0);
+        Panel::top("run table")
+            .frame(frame)
+            .resizable(true)
+            .default_size(height)
+            .size_range(110.0..=900.0)
+            .show(ui, |ui| {
+                let undo = !self.deleted.is_empty();
+                self.table.ui(context, &self.ledger, &mut self.ticked, undo, ui);
+            });
+        let side = Frame::side_top_panel(ui.style()).inner_margin(Margin::symmetric(10, 6));
+        Panel::right("run changes")
+            .frame(side)
+            .resizable(true)
+            .default_size(360.0)
+            .size_range(240.0..=640.0)
+            .show(ui, |ui| self.changes.ui(&self.ledger, ui));
+        CentralPanel::default().frame(frame).show(ui, |ui| self.overlay.ui(&self.ledger, &self.ticked, ui));
+    }
+}
+
+fn listed(numbers: impl Iterator<Item = u64>) -> String {
+    let numbers: Vec<String> = numbers.map(|number| number.to_string()).collect();
+    format!("{} {}", if numbers.len() == 1 { "run" } else { "runs" }, numbers.join(", "))
+}
+
+fn empty_ui(ui: &mut Ui) {
+    ui.add_space(0.35 * ui.available_height());
+    ui.vertical_centered(|ui| {
+        ui.label("No run yet.");
+        hint_ui(
+            ui,
+            "Every experiment, fit, refinement and recording becomes a row here, with a number that goes with all that is exported of it.",
+        );
+    });
+}

@@ -1,0 +1,392 @@
+//! One row of the ledger, and all of them.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use flqr_core::model_file::{Entry, Model};
+use flqr_core::record::Log;
+use serde::{Deserialize, Serialize};
+
+/// What was done.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum RunKind {
+    /// A run of the simulated robot or bench.
+    Experiment,
+    /// Friction from a log.
+    Fit,
+    /// Rows of a robot, written to a file.
+    Recording,
+    /// A model refined with logs.
+    Refinement,
+}
+
+impl RunKind {
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Experiment => "experiment",
+            Self::Fit => "fit",
+            Self::Recording => "recording",
+            Self::Refinement => "refinement",
+        }
+    }
+}
+
+/// A number or a word of what a run was made with.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub(crate) enum Value {
+    Number(f64),
+    Text(String),
+}
+
+/// A signal of a run, in the core's unit.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Channel {
+    pub(crate) name: &'static str,
+    pub(crate) unit: &'static str,
+    pub(crate) values: Vec<f64>,
+}
+
+/// What a run looked like over time; not in files.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Series {
+    pub(crate) time_s: Vec<f64>,
+    pub(crate) channels: Vec<Channel>,
+}
+
+impl Series {
+    fn size(&self) -> usize {
+        self.time_s.len() * (1 + self.channels.len())
+    }
+}
+
+/// One row. Its number is the ledger's to give.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Run {
+    /// From 1 on, never given twice.
+    pub(crate) number: u64,
+    /// When it ended, seconds since 1970 (UTC).
+    pub(crate) unix_s: u64,
+    pub(crate) kind: RunKind,
+    /// What it was, in a few words.
+    pub(crate) title: String,
+    pub(crate) seed: Option<u64>,
+    /// Of the model's text and of the logs' columns; the same sources have the same hash on any machine.
+    pub(crate) sources: String,
+    /// All values that it was made with: those of the model, of the settings.
+    pub(crate) made_with: BTreeMap<String, Value>,
+    /// What came of it, in one line.
+    pub(crate) result: String,
+    /// The user's own words.
+    pub(crate) note: String,
+    #[serde(skip)]
+    pub(crate) series: Option<Arc<Series>>,
+}
+
+impl Run {
+    /// A run that has just ended, made with `model` and `logs`.
+    pub(crate) fn new(kind: RunKind, title: impl Into<String>, model: Option<&Model>, logs: &[&Log]) -> Self {
+        let made_with = model.map(Model::entries).unwrap_or_default().into_iter().map(|(key, entry)| {
+            let value = match entry {
+                Entry::Number(number) => Value::Number(number),
+                Entry::Text(text) => Value::Text(text),
+            };
+            (key, value)
+        });
+        let mut hash = Hash::new();
+        if let Some(model) = model {
+            hash.text(&model.to_toml());
+        }
+        for log in logs {
+            hash.log(log);
+        }
+        Self {
+            number: 0,
+            unix_s: 0,
+            kind,
+            title: title.into(),
+            seed: None,
+            sources: hash.hex(),
+            made_with: made_with.collect(),
+            result: String::new(),
+            note: String::new(),
+            series: None,
+        }
+    }
+
+    /// The same with a setting among what it was made with.
+    pub(crate) fn with(mut self, key: &str, value: Value) -> Self {
+        // A file has no numbers that are not finite.
+        let value = match value {
+            Value::Number(number) if !number.is_finite() => Value::Text(number.to_string()),
+            value => value,
+        };
+        self.made_with.insert(key.to_owned(), value);
+        self
+    }
+
+    /// Diagonals of Q and R, where the model has weights.
+    pub(crate) fn weights(&self) -> String {
+        let entry = |key: String| match self.made_with.get(&key) {
+            Some(Value::Number(number)) => Some(crate::widgets::plain(*number, 3)),
+            _ => None,
+        };
+        let diagonal = |letter: &str, size: usize| -> Vec<String> {
+            let of = |index: usize| {
+                entry(format!("lqr.{letter}_diagonal[{index}]"))
+                    .or_else(|| entry(format!("lqr.{letter}[{index}][{index}]")))
+            };
+            (1..=size).filter_map(of).collect()
+        };
+        let (q, r) = (diagonal("q", 4), diagonal("r", 2));
+        if q.is_empty() { String::new() } else { format!("{} | {}", q.join(" "), r.join(" ")) }
+    }
+
+    /// What exports say of it, in one line.
+    pub(crate) fn provenance(&self) -> String {
+        let seed = self.seed.map(|seed| format!(", seed {seed}")).unwrap_or_default();
+        format!("run {}: {}{seed}, sources {}", self.number, self.title, self.sources)
+    }
+}
+
+/// Values of all series that are kept; those of older runs go first.
+const MOST_VALUES: usize = 16_000_000;
+
+/// All rows; a part of the session's file.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub(crate) struct Ledger {
+    /// The number given last.
+    last: u64,
+    rows: Vec<Run>,
+}
+
+impl Ledger {
+    /// Adds a row and gives it its number.
+    pub(crate) fn add(&mut self, run: Run, unix_s: u64) -> u64 {
+        self.last += 1;
+        self.rows.push(Run { number: self.last, unix_s, ..run });
+        self.forget_old_series();
+        self.last
+    }
+
+    fn forget_old_series(&mut self) {
+        let mut kept = 0;
+        for run in self.rows.iter_mut().rev() {
+            kept += run.series.as_ref().map_or(0, |series| series.size());
+            if kept > MOST_VALUES {
+                run.series = None;
+            }
+        }
+    }
+
+    /// Oldest first.
+    pub(crate) fn rows(&self) -> &[Run] {
+        &self.rows
+    }
+
+    pub(crate) fn row(&self, number: u64) -> Option<&Run> {
+        self.rows.iter().find(|run| run.number == number)
+    }
+
+    pub(super) fn row_mut(&mut self, number: u64) -> Option<&mut Run> {
+        self.rows.iter_mut().find(|run| run.number == number)
+    }
+
+    /// What the session's file keeps.
+    pub(super) fn to_value(&self) -> serde_json::Value {
+        serde_json::to_value(self).unwrap_or_default()
+    }
+
+    /// Reads what a session's file has kept; rows that are here too keep their curves.
+    ///
+    /// # Errors
+    /// A sentence about rows that cannot be read. They are left out, and the others are used.
+    pub(super) fn take_value(&mut self, value: &serde_json::Value) -> Result<(), String> {
+        let kept = value.get("rows").and_then(serde_json::Value::as_array).ok_or("“runs” cannot be read")?;
+        let mut rows: Vec<Run> = kept.iter().filter_map(|row| Run::deserialize(row).ok()).collect();
+        rows.sort_by_key(|row| row.number);
+        rows.dedup_by_key(|row| row.number);
+        for row in &mut rows {
+            let here = self
+                .row(row.number)
+                .filter(|here| (here.unix_s, &here.sources) == (row.unix_s, &row.sources));
+            row.series = here.and_then(|here| here.series.clone());
+        }
+        let missing = kept.len() - rows.len();
+        let last = value.get("last").and_then(serde_json::Value::as_u64).unwrap_or(0);
+        self.last = rows.last().map_or(0, |row| row.number).max(last);
+        self.rows = rows;
+        if missing == 0 { Ok(()) } else { Err(format!("“runs” has {missing} rows that cannot be read")) }
+    }
+
+    /// Takes a row out.
+    pub(super) fn remove(&mut self, number: u64) -> Option<Run> {
+        let index = self.rows.iter().position(|run| run.number == number)?;
+        Some(self.rows.remove(index))
+    }
+
+    /// Puts a row back to where its number belongs.
+    pub(super) fn put_back(&mut self, run: Run) {
+        let index = self.rows.partition_point(|row| row.number < run.number);
+        self.rows.insert(index, run);
+        self.forget_old_series();
+    }
+}
+
+/// A difference between what two runs were made with.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Difference {
+    pub(crate) key: String,
+    pub(crate) old: Option<Value>,
+    pub(crate) new: Option<Value>,
+}
+
+/// What changed from `old` to `new`, in the order of the names.
+pub(crate) fn differences(old: &Run, new: &Run) -> Vec<Difference> {
+    let keys: std::collections::BTreeSet<_> = old.made_with.keys().chain(new.made_with.keys()).collect();
+    let difference = |key: &String| {
+        let (old, new) = (old.made_with.get(key), new.made_with.get(key));
+        (old != new).then(|| Difference { key: key.clone(), old: old.cloned(), new: new.cloned() })
+    };
+    keys.into_iter().filter_map(difference).collect()
+}
+
+/// A 64-bit hash that is the same on all machines: FNV-1a over bytes, and over numbers as words.
+struct Hash(u64);
+
+impl Hash {
+    fn new() -> Self {
+        Self(0xcbf2_9ce4_8422_2325)
+    }
+
+    fn word(&mut self, word: u64) {
+        self.0 = (self.0 ^ word).wrapping_mul(0x0000_0100_0000_01b3);
+        // A word's high bits have to reach the low ones too.
+        self.0 ^= self.0 >> 32;
+    }
+
+    fn text(&mut self, text: &str) {
+        for byte in text.bytes() {
+            self.word(byte.into());
+        }
+        self.word(0x100);
+    }
+
+    fn log(&mut self, log: &Log) {
+        for column in &log.columns {
+            self.text(&column.name);
+            for value in &column.values {
+                self.word(value.to_bits());
+            }
+        }
+    }
+
+    fn hex(&self) -> String {
+        format!("{:016x}", self.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use flqr_core::model_file::presets;
+    use flqr_core::record::Column;
+
+    use super::*;
+
+    fn run(number: u64, model: &Model) -> Run {
+        Run { number, ..Run::new(RunKind::Experiment, "flat, LQR", Some(model), &[]) }
+    }
+
+    #[test]
+    fn rows_have_numbers_that_are_never_given_twice_and_come_back_in_their_place() {
+        let mut ledger = Ledger::default();
+        for expected in 1..=3 {
+            assert_eq!(ledger.add(run(0, &presets::paper()), 7), expected);
+        }
+        let second = ledger.remove(2).unwrap();
+        ledger.remove(3).unwrap();
+        assert_eq!(ledger.add(run(0, &presets::paper()), 8), 4);
+        ledger.put_back(second);
+        assert_eq!(ledger.rows().iter().map(|run| run.number).collect::<Vec<_>>(), [1, 2, 4]);
+    }
+
+    #[test]
+    fn a_ledger_survives_its_file_without_the_series() {
+        let mut ledger = Ledger::default();
+        let series = Some(Arc::new(Series { time_s: vec![0.0], channels: Vec::new() }));
+        ledger.add(Run { series, seed: Some(3), ..run(0, &presets::paper()) }, 1_700_000_000);
+        let no_number = run(0, &presets::paper()).with("result.rmse", Value::Number(f64::NAN));
+        ledger.add(no_number, 1_700_000_001);
+        ledger.add(run(0, &presets::paper()), 1_700_000_002);
+        ledger.remove(3).unwrap();
+        let value: serde_json::Value = serde_json::from_str(&ledger.to_value().to_string()).unwrap();
+        let mut read = Ledger::default();
+        read.take_value(&value).unwrap();
+        assert_eq!(read.rows()[0], Run { series: None, ..ledger.rows()[0].clone() });
+        assert_eq!(read.rows()[1], ledger.rows()[1]);
+        assert_eq!(value["rows"][0]["made_with"]["robot.body_mass_kg"], 13.0);
+        assert_eq!(read.add(run(0, &presets::paper()), 8), 4, "3 was given");
+        ledger.take_value(&value).unwrap();
+        assert!(ledger.rows()[0].series.is_some(), "rows that are here keep their curves");
+    }
+
+    #[test]
+    fn a_row_that_cannot_be_read_is_said_and_the_others_are_used() {
+        let mut ledger = Ledger::default();
+        for _ in 0..3 {
+            ledger.add(run(0, &presets::paper()), 7);
+        }
+        let mut value = ledger.to_value();
+        value["rows"][1]["kind"] = "dance".into();
+        value["last"] = "many".into();
+        let mut read = Ledger::default();
+        assert_eq!(read.take_value(&value), Err("“runs” has 1 rows that cannot be read".to_owned()));
+        assert_eq!(read.rows().iter().map(|run| run.number).collect::<Vec<_>>(), [1, 3]);
+        assert_eq!(read.add(run(0, &presets::paper()), 8), 4);
+        for no_ledger in [serde_json::json!([]), serde_json::json!({ "rows": 3 })] {
+            assert!(read.take_value(&no_ledger).is_err());
+            assert_eq!(read.rows().len(), 3, "what is there stays");
+        }
+    }
+
+    #[test]
+    fn what_changed_is_what_differs_in_the_files() {
+        let mut model = presets::paper();
+        let old = run(1, &model).with("setting.seconds", Value::Number(60.0));
+        if let flqr_core::model_file::Rig::Robot(robot) = &mut model.rig {
+            robot.parameters.wheel_mass_kg = 1.5;
+            robot.limits.torque_nm = None;
+        }
+        let found = differences(&old, &run(2, &model));
+        let number = |value| Some(Value::Number(value));
+        let expected = [
+            ("limits.torque_nm", number(2.42), None),
+            ("robot.wheel_mass_kg", number(1.0), number(1.5)),
+            ("setting.seconds", number(60.0), None),
+        ];
+        let expected = expected.map(|(key, old, new)| Difference { key: key.to_owned(), old, new });
+        assert_eq!(found, expected);
+        assert!(differences(&old, &old).is_empty());
+    }
+
+    #[test]
+    fn the_hash_knows_models_and_logs_apart_and_is_the_same_everywhere() {
+        let log = |value: f64| {
+            let mut log = Log::default();
+            log.columns.push(Column { name: "time_s".to_owned(), values: vec![0.0, value] });
+            log
+        };
+        let of = |value| Run::new(RunKind::Fit, "fit", None, &[&log(value)]).sources;
+        assert_eq!(of(1.0), of(1.0));
+        assert_ne!(of(1.0), of(1.0 + f64::EPSILON));
+        assert_ne!(of(1.0), of(-1.0));
+        // FNV-1a's own offset: nothing was hashed.
+        assert_eq!(Run::new(RunKind::Fit, "fit", None, &[]).sources, "cbf29ce484222325");
+    }
+
+    #[test]
+    fn weights_are_told_whether_they_are_full_or_diagonal() {
+        assert_eq!(run(1, &presets::paper()).weights(), "2 0.01 58.5 0.01 | 1 1");
+    }
+}

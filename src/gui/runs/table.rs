@@ -1,0 +1,216 @@
+//! The rows, newest first.
+
+use std::collections::BTreeSet;
+
+use egui::{Button, Grid, Label, RichText, ScrollArea, TextEdit, Ui};
+
+use super::run::{Ledger, Run};
+use super::{RunsCommand, overlay};
+use crate::command::Command;
+use crate::context::ViewContext;
+use crate::widgets::{hint_ui, mono, section_ui};
+
+/// Most rows drawn; the filter finds the others.
+const MOST_ROWS: usize = 300;
+const NOTE_WIDTH: f32 = 150.0;
+/// Least and greatest width of a result.
+const RESULT_WIDTH: [f32; 2] = [160.0, 620.0];
+
+/// What has been typed.
+#[derive(Default)]
+pub(super) struct RunTable {
+    filter: String,
+    /// A note that is being typed.
+    note: Option<(u64, String)>,
+    /// Width of all columns but the result, when they were drawn last.
+    others_width: f32,
+}
+
+impl RunTable {
+    pub(super) fn ui(
+        &mut self,
+        context: &ViewContext<'_>,
+        ledger: &Ledger,
+        ticked: &mut BTreeSet<u64>,
+        can_undo: bool,
+        ui: &mut Ui,
+    ) {
+        section_ui(ui, "Runs", |ui| self.head_ui(context, ledger, ticked, can_undo, ui));
+        let found: Vec<&Run> = ledger.rows().iter().rev().filter(|run| self.finds(run)).collect();
+        if found.is_empty() {
+            hint_ui(ui, "No row has these words in it.");
+        }
+        let result_width = (ui.available_width() - self.others_width).clamp(RESULT_WIDTH[0], RESULT_WIDTH[1]);
+        ScrollArea::both().id_salt("runs").auto_shrink(false).show(ui, |ui| {
+            let grid =
+                Grid::new("run rows").num_columns(10).striped(true).spacing([12.0, 3.0]).show(ui, |ui| {
+                    for head in
+                        ["show", "run", "UTC", "kind", "what", "seed", "Q | R", "sources", "result", "note"]
+                    {
+                        hint_ui(ui, head);
+                    }
+                    ui.end_row();
+                    for run in found.iter().take(MOST_ROWS) {
+                        self.row_ui(context, run, ticked, result_width, ui);
+                        ui.end_row();
+                    }
+                });
+            self.others_width = (grid.response.rect.width() - result_width).max(0.0) + 16.0;
+            if found.len() > MOST_ROWS {
+                hint_ui(ui, format!("and {} older ones: the filter finds them", found.len() - MOST_ROWS));
+            }
+        });
+    }
+
+    /// From the right to the left.
+    fn head_ui(
+        &mut self,
+        context: &ViewContext<'_>,
+        ledger: &Ledger,
+        ticked: &mut BTreeSet<u64>,
+        can_undo: bool,
+        ui: &mut Ui,
+    ) {
+        if ui
+            .button("Copy rows")
+            .on_hover_text("All rows as a table for a spreadsheet, to the clipboard")
+            .clicked()
+        {
+            ui.ctx().copy_text(as_text(ledger));
+        }
+        let undo = ui.add_enabled(can_undo, Button::new("Undo delete"));
+        if undo.on_hover_text("Bring back the rows that were deleted last").clicked() {
+            context.commands.send(Command::Runs(RunsCommand::UndoDelete));
+        }
+        let delete = ui.add_enabled(!ticked.is_empty(), Button::new("Delete ticked"));
+        if delete.on_hover_text("Take the ticked rows out of the ledger").clicked() {
+            context.commands.send(Command::Runs(RunsCommand::Delete(ticked.iter().copied().collect())));
+        }
+        let none = ui.add_enabled(!ticked.is_empty(), Button::new("Untick all"));
+        if none.on_hover_text("Draw none of the rows").clicked() {
+            ticked.clear();
+        }
+        let field = TextEdit::singleline(&mut self.filter).hint_text("filter").desired_width(140.0);
+        ui.add(field)
+            .accessible_name("filter of runs")
+            .on_hover_text("Rows that have all of these words in them");
+    }
+
+    fn finds(&self, run: &Run) -> bool {
+        let text = format!("{} {} {} {} {}", run.number, run.kind.name(), run.title, run.result, run.note);
+        let text = text.to_lowercase();
+        self.filter.to_lowercase().split_whitespace().all(|word| text.contains(word))
+    }
+
+    fn row_ui(
+        &mut self,
+        context: &ViewContext<'_>,
+        run: &Run,
+        ticked: &mut BTreeSet<u64>,
+        result_width: f32,
+        ui: &mut Ui,
+    ) {
+        let number = run.number;
+        let mut tick = ticked.contains(&number);
+        ui.horizontal(|ui| {
+            let drawn = run.series.is_some();
+            let help = if drawn { "Draw it below, over the other ticked rows" } else { overlay::NO_SERIES };
+            let check = ui.checkbox(&mut tick, "").accessible_name(format!("show run {number}"));
+            if check.on_hover_text(help).changed() {
+                if tick {
+                    ticked.insert(number)
+                } else {
+                    ticked.remove(&number)
+                };
+            }
+            if tick && drawn {
+                overlay::key_ui(ui, ticked, number);
+            }
+        });
+        ui.horizontal(|ui| {
+            ui.label(mono(number.to_string()).strong());
+            let delete =
+                ui.add(Button::new("×").small().frame(false)).accessible_name(format!("delete run {number}"));
+            if delete.on_hover_text("Take this row out; Undo delete brings it back").clicked() {
+                context.commands.send(Command::Runs(RunsCommand::Delete(vec![number])));
+            }
+        });
+        ui.label(mono(clock(run.unix_s))).on_hover_text(format!("{} seconds since 1970", run.unix_s));
+        ui.label(run.kind.name());
+        ui.label(&run.title);
+        ui.label(mono(run.seed.map_or("–".to_owned(), |seed| seed.to_string())));
+        ui.label(mono(run.weights()).small());
+        ui.label(mono(run.sources.get(..8).unwrap_or(&run.sources)).small().weak())
+            .on_hover_text(format!("{}: hash of the model and of the logs' columns", run.sources));
+        ui.allocate_ui(egui::vec2(result_width, 18.0), |ui| {
+            ui.set_min_width(result_width);
+            ui.add(Label::new(RichText::new(&run.result).small()).truncate()).on_hover_text(&run.result);
+        });
+        self.note_ui(context, run, ui);
+    }
+
+    /// A note is taken when it is left, so that it is one change.
+    fn note_ui(&mut self, context: &ViewContext<'_>, run: &Run, ui: &mut Ui) {
+        let mut text = match &self.note {
+            Some((number, text)) if *number == run.number => text.clone(),
+            _ => run.note.clone(),
+        };
+        let field = TextEdit::singleline(&mut text).desired_width(NOTE_WIDTH).hint_text("note");
+        let field = ui.add(field).accessible_name(format!("note of run {}", run.number));
+        if field.changed() {
+            self.note = Some((run.number, text));
+        }
+        if field.lost_focus()
+            && let Some((number, text)) = self.note.take_if(|(number, _)| *number == run.number)
+        {
+            context.commands.send(Command::Runs(RunsCommand::SetNote(number, text)));
+        }
+    }
+}
+
+/// Time of day, UTC.
+fn clock(unix_s: u64) -> String {
+    let second = unix_s % 86_400;
+    format!("{:02}:{:02}:{:02}", second / 3600, second / 60 % 60, second % 60)
+}
+
+/// All rows with tabs between the cells.
+fn as_text(ledger: &Ledger) -> String {
+    let mut text = "run\tunix_s\tkind\twhat\tseed\tq_and_r\tsources\tresult\tnote\n".to_owned();
+    for run in ledger.rows() {
+        let seed = run.seed.map(|seed| seed.to_string()).unwrap_or_default();
+        let cells = [
+            run.number.to_string(),
+            run.unix_s.to_string(),
+            run.kind.name().to_owned(),
+            run.title.clone(),
+            seed,
+            run.weights(),
+            run.sources.clone(),
+            run.result.clone(),
+            run.note.clone(),
+        ];
+        // A cell must not end a row.
+        text += &cells.map(|cell| cell.replace(['\t', '\n', '\r'], " ")).join("\t");
+        text.push('\n');
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::run::RunKind;
+    use super::*;
+
+    #[test]
+    fn rows_as_text_keep_their_columns_whatever_is_noted() {
+        let mut ledger = Ledger::default();
+        ledger
+            .add(Run { note: "a\tb\nc".to_owned(), ..Run::new(RunKind::Fit, "friction", None, &[]) }, 86_399);
+        let text = as_text(&ledger);
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(lines.len(), 2);
+        assert!(lines.iter().all(|line| line.split('\t').count() == 9), "{text}");
+        assert_eq!(clock(86_399), "23:59:59");
+    }
+}
