@@ -9,7 +9,7 @@ use crate::parameter::{ParameterError, within};
 /// Shares of themselves by which declared numbers may be off; what a file does not name has its group's default.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Tolerances {
-    /// Key and share, as the file has them.
+    /// Key and share, sorted by the key.
     named: Vec<(&'static str, f64)>,
 }
 
@@ -86,8 +86,10 @@ impl Tolerances {
             return Err(ParameterError { name: "tolerance", value: share, allowed });
         };
         within(key, share, 0.0..=1.0, "a share from 0 to 1")?;
-        self.named.retain(|(name, _)| *name != key);
-        self.named.push((key, share));
+        match self.named.binary_search_by_key(&key, |(name, _)| *name) {
+            Ok(place) => self.named[place].1 = share,
+            Err(place) => self.named.insert(place, (key, share)),
+        }
         Ok(())
     }
 
@@ -222,5 +224,18 @@ mod tests {
         let mut tolerances = Tolerances::default();
         assert!(tolerances.set("colour", 0.1).is_err() && tolerances.set("masses", 0.5).is_ok());
         assert_eq!(tolerances.share_of("body_mass_kg"), 0.5);
+    }
+
+    #[test]
+    fn the_order_in_which_shares_are_set_does_not_count() {
+        let set = |keys: &[(&str, f64)]| {
+            let mut found = Tolerances::default();
+            keys.iter().for_each(|&(key, share)| found.set(key, share).unwrap());
+            found
+        };
+        assert_eq!(
+            set(&[("friction", 0.2), ("masses", 0.1), ("friction", 0.3)]),
+            set(&[("masses", 0.1), ("friction", 0.3)])
+        );
     }
 }

@@ -24,6 +24,7 @@ mod next_experiment;
 mod pages;
 mod pictures;
 mod prediction;
+mod rates;
 mod robot;
 pub mod select;
 mod verdict;

@@ -12,7 +12,7 @@ mod change;
 mod experiment;
 mod ground;
 mod motors;
-pub(crate) mod noise;
+mod noise;
 mod planar;
 mod plant;
 mod recovery;

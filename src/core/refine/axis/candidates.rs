@@ -74,6 +74,11 @@ impl Candidate {
         if self.is_gain() { 1.0 / (1.0 + coefficient) - 1.0 } else { coefficient }
     }
 
+    /// How fast that amplitude changes with its coefficient, whatever the sign.
+    pub(super) fn amplitude_slope(&self, coefficient: f64) -> f64 {
+        if self.is_gain() { (1.0 + coefficient).powi(-2) } else { 1.0 }
+    }
+
     /// Whether its columns are made of the measured effort, which then explains itself.
     pub(super) fn uses_effort(&self) -> bool {
         let other = ["load_dependent_friction", "torque_ripple"];

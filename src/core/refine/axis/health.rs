@@ -1,6 +1,7 @@
 //! What makes a log unfit to refine an axis with, said before any effect is named.
 
 use crate::record::{self, HealthFinding, Log, Severity};
+use crate::refine::rates;
 use crate::refine::select::{Blocks, Member};
 
 use super::rig::{Declared, Nuisance};
@@ -25,9 +26,11 @@ fn finding(severity: Severity, column: &str, problem: String, mend: impl Into<St
     HealthFinding { severity, column: column.to_owned(), problem, mend: mend.into() }
 }
 
-/// Findings about the logs.
-pub(super) fn check(logs: &[Log], declared: &Declared) -> Vec<HealthFinding> {
-    let mut found: Vec<HealthFinding> = logs.iter().flat_map(record::data_health).collect();
+/// Findings about logs, those that are held out among them.
+pub(super) fn check<'a>(logs: impl IntoIterator<Item = &'a Log>, declared: &Declared) -> Vec<HealthFinding> {
+    let logs: Vec<&Log> = logs.into_iter().collect();
+    let mut found: Vec<HealthFinding> = logs.iter().flat_map(|log| record::data_health(log)).collect();
+    found.extend(rates::check(&logs));
     let names = declared.names();
     for log in logs {
         let column = |name: &str| log.column(name).unwrap_or_default();

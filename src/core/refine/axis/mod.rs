@@ -93,7 +93,7 @@ pub(super) fn refine(
     watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<Refinement, RefineError> {
     let mut declared = Declared::new(model, options.motor);
-    let mut data_health = health::check(logs, &declared);
+    let mut data_health = health::check(logs.iter().chain(held_out), &declared);
     let rows = Rows::new(logs, held_out, declared.names());
     declared.take_over_free(&rows, &options.estimate);
     let fitted = rows.rows.iter().filter(|row| row.part == Part::Fit).count();
@@ -364,18 +364,20 @@ fn found_effects(
         let shape: Vec<f64> = members.iter().flat_map(|&i| search.picks[i].shape.clone()).collect();
         let columns: Vec<usize> =
             members.iter().flat_map(|&i| firsts[i]..firsts[i] + search.picks[i].columns.len()).collect();
+        let coefficient = |column: usize| fit.judged.coefficients[column];
         let amplitudes: Vec<f64> = if pick.fixed {
             Vec::new()
         } else {
-            columns.iter().map(|&column| pick.amplitude(fit.judged.coefficients[column])).collect()
+            columns.iter().map(|&column| pick.amplitude(coefficient(column))).collect()
         };
         let Ok(effect) = Effect::estimated(pick.kind, declared.machine.kind, None, &shape, &amplitudes)
         else {
             continue;
         };
         let shape_widths = search.shape_errors(fit, &members);
-        let (mut shape_widths, mut widths) =
-            (shape_widths.into_iter(), columns.iter().map(|&column| fit.judged.standard_error(column)));
+        let width =
+            |&column: &usize| fit.judged.standard_error(column) * pick.amplitude_slope(coefficient(column));
+        let (mut shape_widths, mut widths) = (shape_widths.into_iter(), columns.iter().map(width));
         let parameters = pick.kind.parameters;
         let ci95 = effect
             .parameters()

@@ -122,7 +122,6 @@ impl Declared {
         }
     }
 
-    /// How a report names things.
     /// Columns as what a residual may depend on.
     pub(super) fn variables(
         &self,
@@ -386,7 +385,8 @@ impl Declared {
         let curve = self.corrected_curve(corrections);
         let has_friction = self.friction.is_some()
             || corrections.iter().any(|(key, _)| keys[place::VISCOUS..=place::OFFSET].contains(key));
-        let friction = if has_friction { curve } else { None };
+        // Where the corrected numbers make no curve, the declared one stays.
+        let friction = if has_friction { curve.or_else(|| Stribeck::new(self.curve()).ok()) } else { None };
         let inertia = value(keys[place::INERTIA], self.inertia);
         let inertia = if inertia > 0.0 { inertia } else { self.inertia };
         let mut model = model.clone();

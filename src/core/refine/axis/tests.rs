@@ -179,6 +179,36 @@ fn logs_that_cannot_answer_are_told_before_any_effect() {
     }
 }
 
+/// Held-out logs steer the answer too.
+#[test]
+fn held_out_logs_are_checked_and_have_the_rate_of_the_others() {
+    let (log, other) = (shaft(1, |_, _, _| 0.0), shaft(2, |_, _, _| 0.0));
+    let columns = |change: &dyn Fn(&str, &[f64]) -> Vec<f64>| {
+        let changed = other.columns.iter().map(|column| {
+            let name: &str = &column.name;
+            (column.name.clone(), change(name, &column.values))
+        });
+        Log::from_columns("other.csv", changed)
+    };
+    let dead = columns(&|name, values| match name {
+        "motor_angle_rad" => vec![1.0; values.len()],
+        _ => values.to_vec(),
+    });
+    let half = columns(&|_, values| values.iter().copied().step_by(2).collect());
+    let errors = |found: Refinement| -> Vec<(String, String)> {
+        assert_eq!((found.verdict, found.effects.len()), (Verdict::DataUnfit, 0));
+        let errors = found.data_health.into_iter().filter(|finding| finding.severity == Severity::Error);
+        errors.map(|finding| (finding.column, finding.problem + ": " + &finding.mend)).collect()
+    };
+    let found = errors(refined(SHAFT, std::slice::from_ref(&log), &[dead], &[]));
+    assert_eq!(found[0].0, "motor_angle_rad", "{found:?}");
+    for (logs, held_out) in [(vec![log.clone()], vec![half.clone()]), (vec![log, half], vec![])] {
+        let [(column, told)] = errors(refined(SHAFT, &logs, &held_out, &[])).try_into().unwrap();
+        let parts = ["other.csv has 500.0 rows", "made.csv has 1000.0", "resample every log to 500.0"];
+        assert!(column == "time_s" && parts.iter().all(|part| told.contains(part)), "{told}");
+    }
+}
+
 #[test]
 fn the_same_log_gives_the_same_bytes() {
     let told = || {

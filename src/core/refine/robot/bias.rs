@@ -68,7 +68,7 @@ fn refitted(known: &Found<'_>, twin: &Twin<'_>, levels: Levels, seed: u64) -> Op
     let target = trace.residual();
     let again = |pick: &Candidate| Candidate::new(&trace, pick.kind, pick.form, pick.shape.clone());
     let mut picks: Vec<Candidate> = known.picks.iter().map(again).collect();
-    let mut free = nuisances(&trace, twin.known, &[]);
+    let mut free = nuisances(&trace, twin.known);
     let plain = Channels::new(&trace, &target);
     whitened(&mut picks, &mut free, &plain);
     let rough = Search::new(&trace, &plain, &free, &[], &target, &|| 0.0);

@@ -32,7 +32,7 @@ fn largest(twin: &Twin<'_>, levels: Levels, seed: u64) -> Option<f64> {
     let trace = twin.trace(levels, seed)?;
     let target = trace.residual();
     let channels = Channels::new(&trace, &target);
-    let (mut free, mut tried) = (nuisances(&trace, twin.known, &[]), library(&trace));
+    let (mut free, mut tried) = (nuisances(&trace, twin.known), library(&trace));
     whitened(&mut tried, &mut free, &channels);
     Some(Search::new(&trace, &channels, &free, &tried, &target, &|| 0.0).largest())
 }

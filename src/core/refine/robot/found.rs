@@ -14,6 +14,8 @@ use super::uncertainty::Uncertainty;
 /// Bias of a gyro below which nobody calls it an effect, rad/s, and standard errors above 0.
 const BIAS_RAD_S: f64 = 1e-3;
 const BIAS_Z: f64 = 5.0;
+/// Time over which a gyro is held against the pitch, s.
+const BIAS_BLOCK_S: f64 = 4.0;
 
 /// Share of a value by which the method itself may be off: columns come from a motion that is filled in between the
 /// IMU's readings.
@@ -197,14 +199,13 @@ pub(super) fn refined(
     model
 }
 
-/// The gyro's bias, from the pitch that it should add up to.
-pub(super) fn gyro_bias(logs: &[Readings]) -> Vec<Found> {
-    let mut slopes = Vec::new();
+/// What the gyro gains on the pitch in each block of some seconds, rad/s; the last third of a log apart where `split`.
+fn drifts(logs: &[Readings], split: bool) -> [Vec<f64>; 2] {
+    let mut found = [Vec::new(), Vec::new()];
     for log in logs {
-        let seconds = 4.0;
-        let rows = (seconds / log.dt_s) as usize;
-        let fresh = &log.fresh;
-        for block in fresh.chunk_by(|a, b| a / rows == b / rows).filter(|block| block.len() > 20) {
+        let rows = (BIAS_BLOCK_S / log.dt_s) as usize;
+        let end = if split { 2 * log.rows() / 3 } else { log.rows() };
+        for block in log.fresh.chunk_by(|a, b| a / rows == b / rows).filter(|block| block.len() > 20) {
             let (first, last) = (block[0], block[block.len() - 1]);
             let mut turned = 0.0;
             for pair in block.windows(2) {
@@ -212,29 +213,42 @@ pub(super) fn gyro_bias(logs: &[Readings]) -> Vec<Found> {
                 turned += 0.5 * time * (log.rate_rad_s[pair[0]] + log.rate_rad_s[pair[1]]);
             }
             let time = (last - first) as f64 * log.dt_s;
-            slopes.push((turned - (log.pitch_rad[last] - log.pitch_rad[first])) / time);
+            let slope = (turned - (log.pitch_rad[last] - log.pitch_rad[first])) / time;
+            if last < end {
+                found[0].push(slope);
+            } else if first >= end {
+                found[1].push(slope);
+            }
         }
     }
-    if slopes.len() < 3 {
-        return Vec::new();
+    found
+}
+
+/// The gyro's bias, from the pitch that it should add up to; only where it also adds up better on what is held out.
+pub(super) fn gyro_bias(logs: &[Readings], held_out: &[Readings]) -> Option<Found> {
+    let [slopes, apart] = drifts(logs, held_out.is_empty());
+    let apart =
+        if held_out.is_empty() { apart } else { drifts(held_out, false).into_iter().flatten().collect() };
+    if slopes.len() < 3 || apart.is_empty() {
+        return None;
     }
     let count = slopes.len() as f64;
     let mean = slopes.iter().sum::<f64>() / count;
     let variance = slopes.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (count - 1.0);
     let error = (variance / count).sqrt();
-    if mean.abs() < BIAS_RAD_S.max(BIAS_Z * error) {
-        return Vec::new();
+    let power = |bias: f64| apart.iter().map(|drift| (drift - bias).powi(2)).sum::<f64>();
+    let drop = 1.0 - (power(mean) / power(0.0)).sqrt();
+    if mean.abs() < BIAS_RAD_S.max(BIAS_Z * error) || drop.is_nan() || drop <= 0.0 {
+        return None;
     }
-    let Some(kind) = KINDS.iter().copied().find(|kind| kind.id == "gyro_bias") else { return Vec::new() };
-    let Ok(effect) = Effect::estimated(kind, MachineKind::Robot, None, &[], &[mean]) else {
-        return Vec::new();
-    };
+    let kind = KINDS.iter().copied().find(|kind| kind.id == "gyro_bias")?;
+    let effect = Effect::estimated(kind, MachineKind::Robot, None, &[], &[mean]).ok()?;
     let width = student_t_975(slopes.len() - 1) * error;
-    vec![Found {
+    Some(Found {
         effect,
         ci95: vec![Some([mean - width, mean + width])],
         units: kind.parameters.iter().map(|parameter| parameter.unit(MachineKind::Robot)).collect(),
-        error_drop_percent: 100.0 * (1.0 - (variance / (variance + mean * mean)).sqrt()),
+        error_drop_percent: 100.0 * drop,
         ambiguous_with: Vec::new(),
-    }]
+    })
 }

@@ -2,6 +2,7 @@
 
 use crate::model_file::RobotModel;
 use crate::record::{self, HealthFinding, Log, Severity};
+use crate::refine::rates;
 
 use super::candidates::quantile;
 use super::motion::Readings;
@@ -20,9 +21,14 @@ pub(super) fn unfit(findings: &[HealthFinding]) -> bool {
     findings.iter().any(|finding| finding.severity == Severity::Error)
 }
 
-/// Findings about logs as they are.
-pub(super) fn check(logs: &[Log], readings: &[Readings], robot: &RobotModel) -> Vec<HealthFinding> {
-    let mut found: Vec<HealthFinding> = logs.iter().flat_map(record::data_health).collect();
+/// Findings about logs as they are, those that are held out among them.
+pub(super) fn check<'a>(
+    logs: impl IntoIterator<Item = (&'a Log, &'a Readings)>,
+    robot: &RobotModel,
+) -> Vec<HealthFinding> {
+    let (logs, readings): (Vec<&Log>, Vec<&Readings>) = logs.into_iter().unzip();
+    let mut found: Vec<HealthFinding> = logs.iter().flat_map(|log| record::data_health(log)).collect();
+    found.extend(rates::check(&logs));
     for (log, readings) in logs.iter().zip(readings) {
         found.extend(of_log(log, readings, robot));
     }

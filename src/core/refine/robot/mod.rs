@@ -29,7 +29,7 @@ use std::ops::ControlFlow;
 
 use crate::effects::{Form, Moment};
 use crate::identify::quantile::student_t_975;
-use crate::model_file::{Model, RobotModel, Tolerances};
+use crate::model_file::{Model, RobotModel};
 use crate::record::{HealthFinding, Log, LogKind, Severity};
 
 use super::error::RefineError;
@@ -41,7 +41,7 @@ use candidates::library;
 use channels::Channels;
 use motion::Readings;
 pub(super) use motion::{at_even_times, fresh_rows};
-use nuisance::{Nuisance, nuisances};
+use nuisance::{KEYS, Known, Nuisance, nuisances};
 use search::{Fit, Search, whitened};
 use trace::{Pair, Part, Trace};
 use twin::{Levels, Twin};
@@ -63,12 +63,13 @@ fn report(watch: Watch<'_>, share: f64) -> Result<(), RefineError> {
 pub(super) fn residual(
     model: &Model,
     logs: &[Log],
-    _options: &Options,
+    options: &Options,
     watch: Watch<'_>,
 ) -> Result<Residual, RefineError> {
     let robot = robot_of(model, logs)?;
+    check_names(&options.estimate)?;
     let readings = read(logs)?;
-    let mut data_health = health::check(logs, &readings, robot);
+    let mut data_health = health::check(logs.iter().zip(&readings), robot);
     report(watch, 0.3)?;
     if health::unfit(&data_health) {
         return Ok(Residual { errors: Errors::default(), tests: Vec::new(), data_health });
@@ -124,8 +125,10 @@ pub(super) fn refine(
     watch: Watch<'_>,
 ) -> Result<Refinement, RefineError> {
     let robot = robot_of(model, logs)?;
+    check_names(&options.estimate)?;
     let (training, others) = (read(logs)?, read(held_out)?);
-    let mut data_health = health::check(logs, &training, robot);
+    let read = logs.iter().zip(&training).chain(held_out.iter().zip(&others));
+    let mut data_health = health::check(read, robot);
     if health::unfit(&data_health) {
         return Ok(unfit(model, data_health));
     }
@@ -133,25 +136,22 @@ pub(super) fn refine(
     let of_log = |log: Readings| if is_late { log.acting(robot) } else { log.without_offsets(robot) };
     let acting = |readings: Vec<Readings>| readings.into_iter().map(of_log).collect::<Vec<_>>();
     let (training, others) = (acting(training), acting(others));
-    let biases = found::gyro_bias(&training);
+    let bias = found::gyro_bias(&training, &others);
     let mut trace = Trace::new(robot, training, others);
     data_health.extend(health::check_motion(&trace));
     if data_health.iter().any(|finding| finding.severity == Severity::Error) {
         return Ok(unfit(model, data_health));
     }
-    check_names(&nuisances(&trace, &model.tolerance, &[]), &options.estimate)?;
+    let known = Known { tolerances: &model.tolerance, estimate: &options.estimate };
     let mut channels = Channels::new(&trace, &trace.residual());
     let chance = std::cell::OnceCell::new();
     for pass in 0..2 {
         report(watch, 0.1 + 0.45 * f64::from(pass))?;
         let target = trace.residual();
-        let (mut free, mut tried) = (nuisances(&trace, &model.tolerance, &options.estimate), library(&trace));
+        let (mut free, mut tried) = (nuisances(&trace, known), library(&trace));
         whitened(&mut tried, &mut free, &channels);
-        let by_chance = || {
-            *chance.get_or_init(|| {
-                by_chance(&trace, &channels, &free, &target, (&model.tolerance, options.seed))
-            })
-        };
+        let by_chance =
+            || *chance.get_or_init(|| by_chance(&trace, &channels, &free, &target, (known, options.seed)));
         let mut search = Search::new(&trace, &channels, &free, &tried, &target, &by_chance);
         search.run(&mut |share| report(watch, 0.1 + 0.45 * f64::from(pass) + 0.4 * share))?;
         search.settle();
@@ -162,7 +162,7 @@ pub(super) fn refine(
         let Some(fit) = search.fit(&search.picks) else { return Ok(unfit(model, data_health)) };
         let last = pass == 1 || search.picks.is_empty();
         if last {
-            return Ok(answer(model, &search, &fit, (biases, options.seed), data_health));
+            return Ok(answer(model, &search, &fit, (bias, known, options.seed), data_health));
         }
         let left = search.left_raw(&search.picks, &fit.judged.coefficients);
         let loads = trace.loads(&found::laws(&search, &fit));
@@ -175,7 +175,7 @@ pub(super) fn refine(
 /// A clean robot that stands in for the recorded one, with its noise; none where it cannot be simulated.
 fn twin<'a>(
     trace: &'a Trace<'_>,
-    known: &'a Tolerances,
+    known: Known<'a>,
     channels: &Channels,
     corrections: &[(&Nuisance, f64)],
     seed: u64,
@@ -191,7 +191,7 @@ fn by_chance(
     channels: &Channels,
     free: &[Nuisance],
     target: &Pair,
-    (known, seed): (&Tolerances, u64),
+    (known, seed): (Known<'_>, u64),
 ) -> f64 {
     let search = Search::new(trace, channels, free, &[], target, &|| 0.0);
     let Some(bare) = search.fit(&[]) else { return 0.0 };
@@ -201,7 +201,7 @@ fn by_chance(
 }
 
 /// Takes off what the chain itself adds to the sizes.
-fn unbiased(search: &Search<'_>, mut fit: Fit, known: &Tolerances, seed: u64) -> Fit {
+fn unbiased(search: &Search<'_>, mut fit: Fit, known: Known<'_>, seed: u64) -> Fit {
     let is_simulated = |pick: &candidates::Candidate| pick.form == Form::Law && !pick.kind.trial.brief;
     if search.picks.is_empty() || !search.picks.iter().all(is_simulated) {
         return fit;
@@ -219,10 +219,9 @@ fn unbiased(search: &Search<'_>, mut fit: Fit, known: &Tolerances, seed: u64) ->
     fit
 }
 
-fn check_names(nuisances: &[Nuisance], names: &[String]) -> Result<(), RefineError> {
-    let known: Vec<&str> = nuisances.iter().map(|n| n.key).filter(|key| !key.is_empty()).collect();
-    match names.iter().find(|name| *name != "all" && !known.contains(&name.as_str())) {
-        Some(name) => Err(RefineError::UnknownParameter { name: name.clone(), allowed: known.join(", ") }),
+fn check_names(names: &[String]) -> Result<(), RefineError> {
+    match names.iter().find(|name| *name != "all" && !KEYS.contains(&name.as_str())) {
+        Some(name) => Err(RefineError::UnknownParameter { name: name.clone(), allowed: KEYS.join(", ") }),
         None => Ok(()),
     }
 }
@@ -250,7 +249,7 @@ fn answer(
     model: &Model,
     search: &Search<'_>,
     fit: &Fit,
-    (biases, seed): (Vec<Found>, u64),
+    (bias, known, seed): (Option<Found>, Known<'_>, u64),
     data_health: Vec<HealthFinding>,
 ) -> Refinement {
     let trace = search.trace;
@@ -267,10 +266,9 @@ fn answer(
         || leftover < LITTLE && share > MOST_OF_IT;
     let picks = if explained { search.picks.as_slice() } else { &[] };
     let used = if explained { fit } else { bare };
-    let sized =
-        if picks.is_empty() { used.clone() } else { unbiased(search, used.clone(), &model.tolerance, seed) };
+    let sized = if picks.is_empty() { used.clone() } else { unbiased(search, used.clone(), known, seed) };
     let mut effects = found::effects(search, picks, &sized);
-    effects.extend(biases);
+    effects.extend(bias);
     let residual =
         |picks: &[candidates::Candidate], fit: &Fit| search.left_raw(picks, &fit.judged.coefficients);
     let (left_before, left_after) = (residual(&[], bare), residual(picks, used));
@@ -338,8 +336,8 @@ fn explorer(search: &Search<'_>, before: &Pair, after: &Pair) -> Explorer {
 fn corrections(nuisances: &[Nuisance], fit: &Fit) -> Vec<Corrected> {
     let t = student_t_975(fit.blocks.count().max(2) - 1);
     let corrected = |(index, nuisance): (usize, &Nuisance)| {
-        let value = nuisance.declared + fit.judged.coefficients[index];
-        let width = t * fit.judged.standard_error(index);
+        let value = nuisance.corrected(fit.judged.coefficients[index]);
+        let width = t * nuisance.per_motor * fit.judged.standard_error(index);
         Corrected {
             key: nuisance.key,
             declared: nuisance.declared,
@@ -378,3 +376,6 @@ fn errors(trace: &Trace<'_>, channels: &Channels, left: &Pair) -> Errors {
         prediction: Vec::new(),
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -6,18 +6,52 @@ use crate::refine::select::Member;
 
 use super::trace::{Pair, Trace};
 
+/// Every key that a robot's numbers may be freed by.
+pub(super) const KEYS: [&str; 9] = [
+    "body_mass_kg",
+    "com_height_m",
+    "body_inertia_kg_m2",
+    "wheel_inertia_kg_m2",
+    "wheel_mass_kg",
+    "coulomb_nm",
+    "static_nm",
+    "viscous_nm_s_rad",
+    "offset_nm",
+];
+
+/// How well the declared numbers are known: their tolerances, and those that are free.
+#[derive(Clone, Copy)]
+pub(super) struct Known<'a> {
+    pub(super) tolerances: &'a Tolerances,
+    pub(super) estimate: &'a [String],
+}
+
+impl Known<'_> {
+    fn share_of(&self, key: &str) -> f64 {
+        self.tolerances.share_of(key)
+    }
+}
+
 /// A declared number.
 pub(super) struct Nuisance {
     /// Key as in the model file; empty for what no file declares.
     pub(super) key: &'static str,
     pub(super) declared: f64,
-    /// By how much it may be off.
+    /// Share of a coefficient that the declared number changes by: a column of friction stands for the sum of all motors,
+    /// the number for one of them.
+    pub(super) per_motor: f64,
+    /// By how much a coefficient may be off.
     pub(super) tolerance: f64,
     pub(super) pair: Pair,
     pub(super) white: Vec<f64>,
 }
 
 impl Nuisance {
+    /// The declared number with what a coefficient says.
+    pub(super) fn corrected(&self, coefficient: f64) -> f64 {
+        self.declared + self.per_motor * coefficient
+    }
+
     /// Its part in a fit, as a column.
     pub(super) fn member(&self, column: usize) -> Member {
         if self.tolerance.is_finite() { Member::within(column, self.tolerance) } else { Member::free(column) }
@@ -26,20 +60,26 @@ impl Nuisance {
 
 /// Angles that the IMU's mounting and the floor are off by without anybody calling it an effect, rad.
 const MOUNTING_RAD: f64 = 5e-4;
+/// Numbers that each motor has.
+const FRICTION: [&str; 4] = ["coulomb_nm", "static_nm", "viscous_nm_s_rad", "offset_nm"];
 /// Share of the friction that nobody knows next to rest, and the speed below which, rad/s.
 const REST_SHARE: f64 = 0.3;
 const REST_SPEED_RAD_S: f64 = 0.1;
 
-/// All declared numbers of a robot; those named in `estimate` (or all of them) without a tolerance.
-pub(super) fn nuisances(trace: &Trace, known: &Tolerances, estimate: &[String]) -> Vec<Nuisance> {
+/// All declared numbers of a robot; those that are free (or all of them) without a tolerance.
+pub(super) fn nuisances(trace: &Trace, known: Known<'_>) -> Vec<Nuisance> {
     let p = trace.machine.parameters;
     let friction = trace.robot.friction.map(|curve| curve.map(|curve| *curve.parameters()));
+    let motors = friction.iter().flatten().count();
+    let per_motor = |key: &str| if FRICTION.contains(&key) && motors > 1 { 1.0 / motors as f64 } else { 1.0 };
     let mut found = Vec::new();
     let mut add = |key: &'static str, declared: f64, tolerance: f64, pair: Pair| {
-        let free = !key.is_empty() && estimate.iter().any(|name| name == key || name == "all");
+        let free = !key.is_empty() && known.estimate.iter().any(|name| name == key || name == "all");
         let tolerance = if free { f64::INFINITY } else { tolerance };
-        if tolerance > 0.0 {
-            found.push(Nuisance { key, declared, tolerance, pair, white: Vec::new() });
+        // A column of nothing has nothing to say of its number.
+        if tolerance > 0.0 && pair.iter().flatten().any(|value| *value != 0.0) {
+            let per_motor = per_motor(key);
+            found.push(Nuisance { key, declared, per_motor, tolerance, pair, white: Vec::new() });
         }
     };
     let of_kind = |id: &str| {

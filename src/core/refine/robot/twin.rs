@@ -10,14 +10,13 @@ use nalgebra::{Matrix2, Matrix4};
 
 use crate::effects::{Declared, Effect, EffectKind, Law, MachineKind, Moment, Place, Term};
 use crate::lqr::{self, Weights};
-use crate::model_file::{RobotModel, Tolerances};
+use crate::model_file::RobotModel;
 use crate::robot::{RobotParameters, State};
-use crate::simulate::noise::Noise;
-use crate::simulate::{Forcing, PlanarPlant};
+use crate::simulate::{Forcing, Noise, PlanarPlant};
 
 use super::channels::Channels;
 use super::motion::Readings;
-use super::nuisance::Nuisance;
+use super::nuisance::{Known, Nuisance};
 use super::trace::Trace;
 
 /// First guesses of the random force, N, torque, N m, and of the gyro's noise, rad/s, in a row.
@@ -41,22 +40,18 @@ pub(super) struct Twin<'a> {
     /// What acts beside: laws with their sizes.
     acting: Vec<(&'static EffectKind, Term, f64)>,
     gain: [f64; 4],
-    pub(super) known: &'a Tolerances,
+    pub(super) known: Known<'a>,
     logs: Vec<(&'a Readings, &'a [Moment], usize)>,
 }
 
 impl<'a> Twin<'a> {
-    pub(super) fn new(
-        trace: &'a Trace,
-        known: &'a Tolerances,
-        corrections: &[(&Nuisance, f64)],
-    ) -> Option<Self> {
+    pub(super) fn new(trace: &'a Trace, known: Known<'a>, corrections: &[(&Nuisance, f64)]) -> Option<Self> {
         let mut declared = trace.robot.clone();
         declared.effects.clear();
         declared.sensors.imu_latency_s = 0.0;
         let mut robot = declared.clone();
         let value = |key: &str, declared: f64| {
-            corrections.iter().find(|(n, _)| n.key == key).map_or(declared, |(n, off)| n.declared + off)
+            corrections.iter().find(|(n, _)| n.key == key).map_or(declared, |(n, off)| n.corrected(*off))
         };
         let p = robot.parameters;
         let corrected = RobotParameters {

@@ -315,7 +315,7 @@ impl Search<'_> {
                 .min_by(|a, b| a.0.total_cmp(&b.0));
             drop(places);
             let uncertain = self.uncertain(&all).map(|out| (0.0, out));
-            match weakest.filter(|(gain, _)| *gain < LEAST_GAIN).or(uncertain) {
+            match weakest.filter(|(gain, _)| *gain < self.thresholds.gain).or(uncertain) {
                 None => return Some(()),
                 Some((_, out)) => {
                     self.picks.remove(out);

@@ -1,0 +1,30 @@
+//! Logs that go together must have one rate: one kernel serves them all.
+
+use crate::record::{HealthFinding, Log, Severity, row_time_s};
+
+/// Share by which the rate of a log may differ from that of the first.
+const SAME: f64 = 0.01;
+
+/// An error for each log whose rate differs from that of the first.
+pub(super) fn check(logs: &[&Log]) -> Vec<HealthFinding> {
+    let rate = |log: &Log| Some(1.0 / row_time_s(log.column("time_s")?)?);
+    let Some((first, wanted)) = logs.iter().find_map(|log| Some((log, rate(log)?))) else {
+        return Vec::new();
+    };
+    let finding = |log: &&Log| {
+        let own = rate(log).filter(|own| (own / wanted - 1.0).abs() > SAME)?;
+        Some(HealthFinding {
+            severity: Severity::Error,
+            column: "time_s".to_owned(),
+            problem: format!(
+                "{} has {own:.1} rows a second and {} has {wanted:.1}: one filter serves all logs",
+                log.source, first.source
+            ),
+            mend: format!(
+                "record at one rate, or resample every log to {:.1} rows a second",
+                own.min(wanted)
+            ),
+        })
+    };
+    logs.iter().filter_map(finding).collect()
+}
