@@ -70,5 +70,12 @@ fn print(out: &mut dyn Write, shown: &Demonstration) -> io::Result<()> {
         let estimate = own.and_then(|own| own.effect.get(key)).map_or("not".to_owned(), number);
         writeln!(out, "  {key:24}{:>14}{estimate:>14}", number(*value))?;
     }
-    writeln!(out, "\n{}", if truth.named { "It was found." } else { "It was not found by its name." })
+    let like = shown.found.effects.iter().find(|found| found.ambiguous_with.contains(&truth.effect.kind()));
+    match (own, like) {
+        (Some(_), _) => writeln!(out, "\nIt was found."),
+        (None, Some(like)) => {
+            writeln!(out, "\nIt was found as {}, which these records do not tell from it.", like.effect.id())
+        }
+        (None, None) => writeln!(out, "\nIt was not found by its name."),
+    }
 }

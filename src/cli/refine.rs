@@ -37,7 +37,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let logs = arguments.common.read(&arguments.logs)?;
     let held_out = arguments.common.read(&arguments.heldout)?;
     let bar = Progress::new("refine");
-    let file = arguments.out.as_ref().unwrap_or(&arguments.model).display().to_string();
+    let file = arguments.out.as_ref().map_or_else(String::new, |path| path.display().to_string());
     let options = Options { model_file: file, ..arguments.common.options() };
     let found = refine::refine(&model, &logs, &held_out, &options, &mut |share| {
         bar.set((1000.0 * share) as u64, 1000);
@@ -109,7 +109,10 @@ pub(crate) fn print(out: &mut dyn Write, found: &Refinement) -> io::Result<()> {
 
 /// The simulated robot under both controllers, and what becomes of each effect.
 fn print_closed_loop(out: &mut dyn Write, closed_loop: &ClosedLoop) -> io::Result<()> {
-    writeln!(out, "\n{:45}{:>14}{:>14}", "simulated, standard deviations", "before", "after")?;
+    writeln!(out)?;
+    if !closed_loop.scenarios.is_empty() {
+        writeln!(out, "{:45}{:>14}{:>14}", "simulated, standard deviations", "before", "after")?;
+    }
     for pair in &closed_loop.scenarios {
         let rows = [
             ("x", pair.before.x_m.std, pair.after.x_m.std, "m"),

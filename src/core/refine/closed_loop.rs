@@ -1,7 +1,7 @@
 //! The refined model as the plant: what the controller of before and the one made from the refined model do with it.
 //!
 //! An effect that a controller could cancel is offered to it only if the simulated loop stays as calm with it as without:
-//! over seeds, with a payload, with a longer delay, and where the effect is smaller than it was estimated. Otherwise the
+//! with four plants, one seed each: as it is, with a payload, with a longer delay, and with a smaller effect. Otherwise the
 //! refined model carries it with `feedforward = false`: the simulator has it, the controller leaves it.
 
 use std::f64::consts::TAU;
@@ -10,6 +10,7 @@ use std::ops::ControlFlow;
 
 use serde::Serialize;
 
+use super::error::RefineError;
 use crate::effects::{Effect, EffectKind, Feedforward, MachineKind, Role};
 use crate::model_file::{Model, Rig, RobotModel};
 use crate::parallel;
@@ -107,18 +108,27 @@ const STILL_M: f64 = 5e-4;
 const STILL_RAD_S: f64 = 0.05;
 
 /// Simulates the refined model under the controllers of before and after, and marks in it the effects that a controller
-/// must leave. None where no robot can be simulated, or nothing was found.
+/// must leave; all that it could cancel where no loop can be simulated. None where nothing was found.
 pub(super) fn closed_loop(
     declared: &Model,
     refined: &mut Model,
     kinds: &[&'static EffectKind],
     seed: u64,
-) -> Option<ClosedLoop> {
-    let weighted = |model: &Model| model.robot().is_some_and(|robot| robot.weights.is_some());
-    if kinds.is_empty() || !weighted(declared) || !weighted(refined) {
-        return None;
+    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> Result<Option<ClosedLoop>, RefineError> {
+    if kinds.is_empty() {
+        return Ok(None);
     }
-    let feedforward = offered(refined, kinds, seed)?;
+    let added: Vec<usize> = {
+        let (known, all) = (effects_of(declared), effects_of(refined));
+        (0..all.len()).filter(|&place| !known.contains(&all[place])).collect()
+    };
+    let weighted = |model: &Model| model.robot().is_some_and(|robot| robot.weights.is_some());
+    let can_run = weighted(declared) && weighted(refined);
+    let feedforward = offered(refined, kinds, &added, can_run.then_some(seed), watch)?;
+    if !can_run {
+        return Ok(Some(ClosedLoop { scenarios: Vec::new(), feedforward }));
+    }
     let actual = &*refined;
     let scenarios = [Scenario::Station, Scenario::Multisine];
     let jobs: Vec<(Scenario, &Model)> =
@@ -127,13 +137,18 @@ pub(super) fn closed_loop(
         let run = ground_run(*scenario, controller, actual, SECONDS, seed)?;
         Some(told(&run, actual.robot()?, *scenario, FROM_S))
     });
-    let mut runs = runs.into_iter();
-    let mut pairs = Vec::new();
-    for scenario in scenarios {
-        let (before, after) = (runs.next()??, runs.next()??);
-        pairs.push(LoopPair { scenario: scenario.name().to_owned(), before, after });
+    let pairs = scenarios.iter().zip(runs.chunks(2)).filter_map(|(scenario, pair)| {
+        let (before, after) = (pair[0]?, pair[1]?);
+        Some(LoopPair { scenario: scenario.name().to_owned(), before, after })
+    });
+    Ok(Some(ClosedLoop { scenarios: pairs.collect(), feedforward }))
+}
+
+fn effects_of(model: &Model) -> &[Effect] {
+    match &model.rig {
+        Rig::Robot(robot) => &robot.effects,
+        Rig::Axis(axis) => &axis.effects,
     }
-    Some(ClosedLoop { scenarios: pairs, feedforward })
 }
 
 fn threads() -> NonZeroUsize {
@@ -237,23 +252,36 @@ fn wave(values: &[f64], waves: usize) -> f64 {
     2.0 * re.hypot(im) / values.len() as f64
 }
 
-/// What becomes of each effect; those that are not offered are marked in the model.
-fn offered(refined: &mut Model, kinds: &[&'static EffectKind], seed: u64) -> Option<Vec<Fed>> {
-    let Rig::Robot(robot) = &refined.rig else { return None };
-    let able: Vec<usize> =
-        (0..robot.effects.len()).filter(|&place| robot.effects[place].is_fed_forward()).collect();
+/// What becomes of each added effect; those that are not offered are marked in the model. Without a seed none can be tried.
+fn offered(
+    refined: &mut Model,
+    kinds: &[&'static EffectKind],
+    added: &[usize],
+    seed: Option<u64>,
+    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> Result<Vec<Fed>, RefineError> {
+    let effects = effects_of(refined);
+    let able: Vec<usize> = added.iter().copied().filter(|&place| effects[place].is_fed_forward()).collect();
     // One after the other, each beside those that have passed, so that none hides behind another.
     let (mut verdicts, mut passed) = (Vec::new(), Vec::new());
-    for &place in &able {
-        let verdict = trial(refined, &able, &passed, place, seed);
+    for (number, &place) in able.iter().enumerate() {
+        if watch(number as f64 / able.len() as f64).is_break() {
+            return Err(RefineError::Cancelled);
+        }
+        let verdict = match seed {
+            Some(seed) => trial(refined, &able, &passed, place, seed),
+            None => Err(UNTRIED.to_owned()),
+        };
         if verdict.is_ok() {
             passed.push(place);
         }
         verdicts.push(verdict);
     }
-    let mut told = Vec::new();
+    let mut told: Vec<Fed> = Vec::new();
     for &kind in kinds {
-        let own = able.iter().position(|&place| robot.effects[place].kind() == kind);
+        // Of several of a kind, each has its own.
+        let before = told.iter().filter(|fed| fed.effect == kind).count();
+        let own = (0..able.len()).filter(|&own| effects[able[own]].kind() == kind).nth(before);
         let (used, reason) = match (own.map(|own| &verdicts[own]), kind.feedforward) {
             (Some(Ok(reason)), _) if kind.by_angle() => (true, format!("{reason}; {ARMED}")),
             (Some(Ok(reason)), _) => (true, reason.clone()),
@@ -268,18 +296,24 @@ fn offered(refined: &mut Model, kinds: &[&'static EffectKind], seed: u64) -> Opt
     let refused: Vec<usize> =
         able.iter().zip(&verdicts).filter(|(_, verdict)| verdict.is_err()).map(|(place, _)| *place).collect();
     keep_from(refined, &refused);
-    Some(told)
+    Ok(told)
 }
 
+/// Why nothing is offered where no loop runs.
+const UNTRIED: &str =
+    "left out: no loop could be simulated with this model, so that nothing shows that it stays calm";
 /// Why a driven robot does without.
 const ARMED: &str = "a driven robot leaves it out, as its motors' angles count from where they were armed";
 
 /// Marks effects that no controller may cancel.
 fn keep_from(model: &mut Model, places: &[usize]) {
-    let Rig::Robot(robot) = &mut model.rig else { return };
+    let effects = match &mut model.rig {
+        Rig::Robot(robot) => &mut robot.effects,
+        Rig::Axis(axis) => &mut axis.effects,
+    };
     for &place in places {
-        if let Ok(left) = robot.effects[place].clone().with_feedforward(false) {
-            robot.effects[place] = left;
+        if let Ok(left) = effects[place].clone().with_feedforward(false) {
+            effects[place] = left;
         }
     }
 }
@@ -303,7 +337,7 @@ fn trial(
     let plants = variations(refined, added);
     let jobs: Vec<(usize, &Model)> = (0..plants.len()).flat_map(|n| [(n, &none), (n, &some)]).collect();
     let runs = parallel::map(&jobs, threads(), |(n, controller)| {
-        ground_run(Scenario::Station, controller, &plants[*n].1, CHECK_SECONDS, seed + *n as u64)
+        ground_run(Scenario::Station, controller, &plants[*n].1, CHECK_SECONDS, seed.wrapping_add(*n as u64))
     });
     let (mut swing, mut worst) = ([0.0; 2], None);
     for (n, pair) in runs.chunks(2).enumerate() {
@@ -418,29 +452,51 @@ mod tests {
         let declared = presets::paper();
         let mut refined = with_cogging(0.05);
         let kinds = [crate::effects::kind("cogging").unwrap()];
-        let found = closed_loop(&declared, &mut refined, &kinds, 1).unwrap();
+        let found = closed_loop(&declared, &mut refined, &kinds, 1, &mut |_| ControlFlow::Continue(()))
+            .unwrap()
+            .unwrap();
         assert!(found.feedforward[0].used, "{found:?}");
         assert!(refined.robot().unwrap().effects[0].is_fed_forward());
         let station = &found.scenarios[0];
         assert!(station.after.x_m.std < station.before.x_m.std, "{station:?}");
     }
 
-    /// Dry friction estimated far too high, fed forward, drives the motors by itself.
+    fn watched(declared: &Model, refined: &mut Model, ids: &[&str], seed: u64) -> ClosedLoop {
+        let kinds: Vec<&'static EffectKind> =
+            ids.iter().map(|id| crate::effects::kind(id).unwrap()).collect();
+        closed_loop(declared, refined, &kinds, seed, &mut |_| ControlFlow::Continue(())).unwrap().unwrap()
+    }
+
+    /// Without weights there is no loop to try it in. What was declared before stays as it was.
     #[test]
-    fn friction_that_would_drive_the_robot_is_left_out_and_marked() {
-        let mut refined = presets::paper();
+    fn an_effect_that_no_loop_has_tried_is_left_out_and_marked() {
+        let mut declared = with_cogging(0.05);
+        let Rig::Robot(robot) = &mut declared.rig else { unreachable!() };
+        robot.weights = None;
+        let mut refined = declared.clone();
         let Rig::Robot(robot) = &mut refined.rig else { unreachable!() };
-        let gain = Effect::new("torque_gain", MachineKind::Robot, None, [("gain", -0.7)]).unwrap();
-        robot.effects.push(gain);
-        let declared = presets::paper();
-        let kinds =
-            [crate::effects::kind("torque_gain").unwrap(), crate::effects::kind("aero_drag").unwrap()];
-        let found = closed_loop(&declared, &mut refined, &kinds, 1).unwrap();
-        let robot = refined.robot().unwrap();
-        assert_eq!(found.feedforward[0].used, robot.effects[0].is_fed_forward());
-        assert!(!found.feedforward[1].used && found.feedforward[1].reason.contains("lean"));
+        let cogging = |order: f64| {
+            let parameters = [("order_1", order), ("cos_1_nm", 0.02), ("sin_1_nm", 0.0)];
+            Effect::new("cogging", MachineKind::Robot, None, parameters).unwrap()
+        };
+        robot.effects.extend([cogging(14.0), cogging(21.0)]);
+        let found = watched(&declared, &mut refined, &["cogging", "cogging", "aero_drag"], u64::MAX);
+        let fed: Vec<bool> = effects_of(&refined).iter().map(Effect::is_fed_forward).collect();
+        assert_eq!(fed, [true, false, false]);
+        assert!(found.scenarios.is_empty() && found.feedforward.len() == 3);
+        assert!(found.feedforward.iter().all(|fed| !fed.used), "{found:?}");
+        assert!(found.feedforward[1].reason.contains("no loop could be simulated"), "{found:?}");
+        assert!(found.feedforward[2].reason.contains("lean"), "{found:?}");
         let text = refined.to_toml();
-        assert_eq!(text.contains("feedforward = false"), !robot.effects[0].is_fed_forward());
+        assert_eq!(text.matches("feedforward = false").count(), 2);
         assert_eq!(Model::from_toml(&text, "again").unwrap(), refined);
+    }
+
+    #[test]
+    fn trials_end_when_they_are_cancelled() {
+        let (declared, mut refined) = (presets::paper(), with_cogging(0.05));
+        let kinds = [crate::effects::kind("cogging").unwrap()];
+        let ended = closed_loop(&declared, &mut refined, &kinds, 1, &mut |_| ControlFlow::Break(()));
+        assert_eq!(ended, Err(RefineError::Cancelled));
     }
 }

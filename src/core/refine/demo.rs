@@ -84,7 +84,7 @@ pub fn demonstrate(
         log.source = format!("record of the scenario {scenario}");
         logs.push(log);
     }
-    let options = Options { seed, model_file: "refined.toml".to_owned(), ..Options::default() };
+    let options = Options { seed, ..Options::default() };
     let mut found = refine(&declared, &logs, &[], &options, &mut |share| watch(0.2 + 0.8 * share))?;
     let named = found.effects.iter().any(|effect| {
         effect.effect.kind() == hidden.kind() || effect.ambiguous_with.contains(&hidden.kind())
@@ -163,13 +163,21 @@ mod tests {
     #[test]
     fn every_hidden_effect_can_be_made_and_the_robot_is_another_one() {
         let declared = presets::paper();
-        for seed in 0..HIDDEN.len() as u64 {
+        let hidden = [
+            (0, "torque_gain", "gain", -0.12),
+            (1, "cogging", "sin_1_nm", 0.03),
+            (2, "tether_spring", "stiffness_n_m", 6.0),
+            (3, "load_dependent_friction", "coefficient", 0.15),
+            (4, "torque_gain", "gain", -0.12),
+        ];
+        for (seed, id, key, value) in hidden {
             let (effect, actual) = hidden_robot(&declared, seed);
-            assert_eq!(
-                effect.parameters().len(),
-                HIDDEN[(seed.wrapping_sub(1) % HIDDEN.len() as u64) as usize].1.len()
-            );
-            assert!(actual != declared && actual.robot().unwrap().validate().is_ok());
+            assert_eq!((effect.id(), effect.get(key)), (id, Some(value)), "seed {seed}");
+            let robot = actual.robot().unwrap();
+            assert_eq!(robot.effects, [effect]);
+            let mass = robot.parameters.body_mass_kg / declared.robot().unwrap().parameters.body_mass_kg;
+            assert!(mass != 1.0 && (mass - 1.0).abs() <= 0.01, "seed {seed}: {mass}");
+            assert!(robot.validate().is_ok());
         }
     }
 }

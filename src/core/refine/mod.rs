@@ -11,7 +11,9 @@
 //! 5. Each effect of the library gives columns: its law over the recorded motion at unit amplitude. Forward selection
 //!    with swaps, pairs and one backward check on the error of left-out blocks ([`select`]). Intervals come from the
 //!    jackknife over blocks.
-//! 6. What is left is held against smooth functions of everything that was recorded. A residual that these explain much
+//! 6. How large a gain has to be for a name is set for each log: simulated clean machines with its motion and its noise
+//!    pass the same search, and what one in a hundred of them would show is the threshold.
+//! 7. What is left is held against smooth functions of everything that was recorded. A residual that these explain much
 //!    better than the library does has no name: `unexplained_residual`.
 
 mod axis;
@@ -63,6 +65,13 @@ pub struct Options {
     pub model_file: String,
 }
 
+/// Share of the work that the search is; the rest is the closed loop, predictions and the next experiment.
+const SEARCH: f64 = 0.75;
+
+fn report(watch: &mut dyn FnMut(f64) -> ControlFlow<()>, share: f64) -> Result<(), RefineError> {
+    if watch(share).is_break() { Err(RefineError::Cancelled) } else { Ok(()) }
+}
+
 /// How far a model is from logs of its machine.
 ///
 /// # Errors
@@ -78,6 +87,7 @@ pub fn residual(
         _ => axis::residual(model, logs, options, watch),
     }?;
     if !found.errors.rmse.0.is_empty() {
+        report(watch, 1.0)?;
         found.errors.prediction = predictions(model, logs, Rows::All, options.motor, options.seed);
     }
     Ok(found)
@@ -102,18 +112,23 @@ pub fn refine(
     if !held_out.is_empty() {
         kind_of(model, held_out)?;
     }
+    let searching = &mut |share: f64| watch(SEARCH * share);
     let mut found = match kind {
-        LogKind::Robot => robot::refine(model, logs, held_out, options, watch),
-        _ => axis::refine(model, logs, held_out, options, watch),
+        LogKind::Robot => robot::refine(model, logs, held_out, options, searching),
+        _ => axis::refine(model, logs, held_out, options, searching),
     }?;
     if found.verdict != Verdict::DataUnfit {
         let kinds: Vec<_> = found.effects.iter().map(|effect| effect.effect.kind()).collect();
-        found.closed_loop = closed_loop::closed_loop(model, &mut found.model, &kinds, options.seed);
+        let trying = &mut |share: f64| watch(SEARCH + 0.1 * share);
+        found.closed_loop = closed_loop::closed_loop(model, &mut found.model, &kinds, options.seed, trying)?;
+        report(watch, SEARCH + 0.1)?;
         let (told, rows) = if held_out.is_empty() { (logs, Rows::LastThird) } else { (held_out, Rows::All) };
         let predicted = |model: &Model| predictions(model, told, rows, options.motor, options.seed);
         found.before.prediction = predicted(model);
+        report(watch, SEARCH + 0.15)?;
         found.after.prediction =
             if found.model == *model { found.before.prediction.clone() } else { predicted(&found.model) };
+        report(watch, SEARCH + 0.2)?;
         let asked = Asked { logs, motor: options.motor, seed: options.seed, file: &options.model_file };
         found.next_experiment = next_experiment::next_experiment(&found, &asked);
     }

@@ -53,14 +53,14 @@ const ROW_S: f64 = 0.01;
 const WORTH: f64 = 5.0;
 /// Load that is put on a body, as a share of it.
 const LOAD: f64 = 0.15;
-/// Declared numbers that are free within tolerances, as effects, and those tolerances as shares.
-const FREE: [(&str, f64); 6] = [
-    ("coulomb_error", 0.1),
-    ("viscous_error", 0.1),
-    ("inertia_error", 0.05),
-    ("mass_error", 0.02),
-    ("com_height_error", 0.01),
-    ("body_inertia_error", 0.05),
+/// Declared numbers that are free within their tolerances, as effects, and their keys on a robot, a shaft and a carriage.
+const FREE: [(&str, [&str; 3]); 6] = [
+    ("coulomb_error", ["coulomb_nm", "coulomb_nm", "coulomb_n"]),
+    ("viscous_error", ["viscous_nm_s_rad", "viscous_nm_s_rad", "viscous_n_s_m"]),
+    ("inertia_error", ["wheel_inertia_kg_m2", "inertia_kg_m2", "mass_kg"]),
+    ("mass_error", ["body_mass_kg", "inertia_kg_m2", "mass_kg"]),
+    ("com_height_error", ["com_height_m"; 3]),
+    ("body_inertia_error", ["body_inertia_kg_m2"; 3]),
 ];
 
 /// What is known of a question.
@@ -95,7 +95,7 @@ pub(super) fn next_experiment(found: &Refinement, asked: &Asked<'_>) -> Option<N
                 separates: words.1,
                 scenario: Some(run.experiment.scenario.name().to_owned()),
                 separation: separations[best],
-                command: Some(run.command(asked.file)),
+                command: Some(run.command(&found.model, asked)),
             })
         }
         _ => {
@@ -135,7 +135,7 @@ fn of_rest(found: &Refinement, asked: &Asked<'_>) -> Option<NextExperiment> {
     };
     Some(NextExperiment {
         scenario: run.map(|run| run.experiment.scenario.name().to_owned()),
-        command: run.map(|run| run.command(asked.file)),
+        command: run.map(|run| run.command(&found.model, asked)),
         ..NextExperiment::in_words(summary)
     })
 }
@@ -148,9 +148,9 @@ struct Run {
 }
 
 impl Run {
-    fn command(&self, file: &str) -> String {
+    fn command(&self, model: &Model, asked: &Asked<'_>) -> String {
         let Experiment { scenario, controller, seconds, .. } = &self.experiment;
-        let file = match file {
+        let file = match asked.file {
             "" => "MODEL".to_owned(),
             plain if plain.chars().all(|c| c.is_ascii_alphanumeric() || "/._-+=".contains(c)) => {
                 plain.to_owned()
@@ -158,9 +158,12 @@ impl Run {
             spaced => format!("'{}'", spaced.replace('\'', "'\\''")),
         };
         let controller = controller.name();
+        // On the ground a log holds both motors.
+        let of_right = asked.motor == Motor::Right && model.robot().is_some() && !self.experiment.on_ground();
+        let motor = if of_right { " --motor right" } else { "" };
         format!(
-            "flqr simulate {file} --scenario {scenario} --controller {controller} --seconds {seconds}{} --log next.csv",
-            self.flags
+            "flqr simulate {file} --scenario {scenario} --controller {controller} --seconds {seconds}{} --seed {}{motor} --log next.csv",
+            self.flags, asked.seed
         )
     }
 }
@@ -333,7 +336,8 @@ impl<'a> View<'a> {
         let curve = curve.map(|curve| *curve.parameters());
         let kind = if ground.is_some() { MachineKind::Robot } else { shaft.kind };
         let (mut free, mut tolerances) = (Vec::new(), Vec::new());
-        for (id, share) in FREE {
+        for (id, keys) in FREE {
+            let share = model.tolerance.share_of(keys[kind as usize]);
             let size = match id {
                 "coulomb_error" => curve.map_or(0.01, |c| c.coulomb_nm),
                 "viscous_error" => curve.map_or(1e-3, |c| c.viscous_nm_s_rad),
@@ -561,6 +565,18 @@ mod tests {
         let command = next.command.unwrap();
         assert!(command.starts_with("flqr simulate 'my robot.toml' --scenario "), "{command}");
         assert!(next.scenario.is_some_and(|scenario| command.contains(&scenario)));
+        assert!(command.contains(" --seed 1 ") && !command.contains("--motor"), "{command}");
+    }
+
+    #[test]
+    fn a_command_names_the_motor_of_the_right_wheel_and_a_word_for_a_file_without_a_name() {
+        let model = presets::paper();
+        let asked = Asked { logs: &[], motor: Motor::Right, seed: 7, file: "" };
+        let commands: Vec<String> = runs(&model).iter().map(|run| run.command(&model, &asked)).collect();
+        let sweep = "flqr simulate MODEL --scenario friction-sweep --controller pi --seconds 120 --seed 7 --motor right";
+        assert_eq!(commands[0], format!("{sweep} --log next.csv"));
+        let still = commands.iter().find(|command| command.contains("station")).unwrap();
+        assert!(!still.contains("--motor"), "{still}");
     }
 
     /// Nothing that a robot can do tells a lag of the IMU: there is no force to compare.

@@ -320,18 +320,21 @@ fn simulated(closed_loop: &ClosedLoop, blocks: &mut Vec<Block>) {
             Cell::Empty,
         ]);
     }
-    blocks.push(Block::Table(Table {
-        caption: "The refined model under the controller of the declared and of the refined model".to_owned(),
-        columns: vec![
-            Column::new("Scenario", ""),
-            Column::new("Measure", ""),
-            Column::new("Before", ""),
-            Column::new("After", ""),
-            Column::new("Unit", ""),
-        ],
-        rows,
-        note: String::new(),
-    }));
+    if !rows.is_empty() {
+        blocks.push(Block::Table(Table {
+            caption: "The refined model under the controller of the declared and of the refined model"
+                .to_owned(),
+            columns: vec![
+                Column::new("Scenario", ""),
+                Column::new("Measure", ""),
+                Column::new("Before", ""),
+                Column::new("After", ""),
+                Column::new("Unit", ""),
+            ],
+            rows,
+            note: String::new(),
+        }));
+    }
     for fed in &closed_loop.feedforward {
         let (tone, label) = if fed.used { (Tone::Good, "used") } else { (Tone::Note, "not used") };
         let label = format!("{} in the controller: {label}", fed.effect.id);

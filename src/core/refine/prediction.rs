@@ -77,11 +77,12 @@ pub(super) fn predictions(
 type Ends = Vec<Vec<[f64; 3]>>;
 
 fn summed(names: &[(&'static str, &'static str)], runs: &[Ends]) -> Vec<Prediction> {
+    let finite = |end: &[f64; 3]| end.iter().all(|value| value.is_finite());
     let mut found = Vec::new();
     for (place, (variable, unit)) in names.iter().enumerate() {
         for (horizon, horizon_s) in HORIZONS_S.into_iter().enumerate() {
             let ends: Vec<[f64; 3]> =
-                runs.iter().filter_map(|run| run.get(horizon)?.get(place).copied()).collect();
+                runs.iter().filter_map(|run| run.get(horizon)?.get(place).copied()).filter(finite).collect();
             if ends.is_empty() {
                 continue;
             }
@@ -104,7 +105,7 @@ struct Record {
     efforts: Vec<Vec<f64>>,
     /// Pitch and pitch rate of a robot, and the rows at which the IMU spoke.
     imu: Option<(Vec<f64>, Vec<f64>, Vec<usize>)>,
-    /// Rows after which time is missing.
+    /// Rows after which time is missing, and rows without a number in every cell, in their order.
     broken: Vec<usize>,
 }
 
@@ -137,7 +138,8 @@ impl Record {
         let dt_s = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
         let rows = ((time[time.len() - 1] - time[0]) / dt_s).round() as usize + 1;
         let limit = 4 * time.len();
-        if !(dt_s > 0.0 && rows > 20 && rows < limit) {
+        // Slower than the shortest prediction.
+        if !(dt_s > 0.0 && dt_s <= HORIZONS_S[0] && rows > 20 && rows < limit) {
             return None;
         }
         let even = |name: &str, held: bool| {
@@ -160,13 +162,21 @@ impl Record {
         } else {
             None
         };
-        let broken = time
-            .windows(2)
-            .filter(|pair| pair[1] - pair[0] > 3.0 * dt_s)
-            .map(|pair| ((pair[0] - time[0]) / dt_s) as usize)
-            .collect();
         let time_s = (0..rows).map(|row| time[0] + row as f64 * dt_s).collect();
-        Some(Self { dt_s, time_s, angles: angles?, efforts: efforts?, imu, broken })
+        let mut record = Self { dt_s, time_s, angles: angles?, efforts: efforts?, imu, broken: Vec::new() };
+        let gaps = time.windows(2).filter(|pair| pair[1] - pair[0] > 3.0 * dt_s);
+        let mut broken: Vec<usize> = gaps.map(|pair| ((pair[0] - time[0]) / dt_s) as usize).collect();
+        broken.extend((0..rows).filter(|&row| !record.is_whole(row)));
+        broken.sort_unstable();
+        record.broken = broken;
+        Some(record)
+    }
+
+    /// Whether every cell of a row has a number.
+    fn is_whole(&self, row: usize) -> bool {
+        let of_imu =
+            self.imu.as_ref().is_none_or(|(pitch, rate, _)| pitch[row].is_finite() && rate[row].is_finite());
+        of_imu && self.angles.iter().chain(&self.efforts).all(|column| column[row].is_finite())
     }
 
     fn margin(&self) -> usize {
@@ -178,7 +188,7 @@ impl Record {
     }
 
     fn ahead(&self, horizon_s: f64) -> usize {
-        (horizon_s / self.dt_s).round() as usize
+        ((horizon_s / self.dt_s).round() as usize).max(1)
     }
 
     /// Rows to start from, a quarter of a second apart.
@@ -191,7 +201,8 @@ impl Record {
         let (margin, ahead) = (self.margin(), self.ahead(HORIZONS_S[HORIZONS_S.len() - 1]));
         let step = ((0.25 / self.dt_s) as usize).max(1);
         let whole = |start: &usize| {
-            self.broken.iter().all(|&row| row + margin < *start || row > start + ahead + margin)
+            let first = self.broken.partition_point(|&row| row + margin < *start);
+            self.broken.get(first).is_none_or(|&row| row > start + ahead + margin)
         };
         let fresh = |start: usize| match &self.imu {
             Some((_, _, fresh)) => {
@@ -200,7 +211,11 @@ impl Record {
             None => start,
         };
         let last = count.saturating_sub(ahead + 2 * margin + 1);
-        (first + margin..last).step_by(step).map(fresh).filter(whole).collect()
+        let starts = (first + margin..last).step_by(step).map(fresh);
+        // The next fresh row may be past the last start, or the same for two of them.
+        let mut starts: Vec<usize> = starts.filter(|&start| start < last).filter(whole).collect();
+        starts.dedup();
+        starts
     }
 
     /// A straight or bent line through the angle around a row: value and slope.
@@ -298,15 +313,20 @@ impl Record {
         for row in 0..=last {
             if chosen.binary_search(&row).is_ok() {
                 let told = self.told(row, weights);
-                let ends =
-                    HORIZONS_S.iter().map(|&h| (self.ahead(h), self.told(row + self.ahead(h), weights)));
+                let ends = HORIZONS_S.map(|h| (self.ahead(h), self.told(row + self.ahead(h), weights)));
                 let most = self.ahead(HORIZONS_S[HORIZONS_S.len() - 1]);
                 let efforts = self.efforts.iter().map(|column| column[row..row + most].to_vec()).collect();
-                let start =
-                    Start { dt_s: self.dt_s, time_s: self.time_s[row], told, ends: ends.collect(), efforts };
-                found.push((moving.clone(), start));
+                // The IMU's rows around it may be outside of what was looked at for gaps.
+                if told.is_finite() && ends.iter().all(|(_, end)| end.is_finite()) {
+                    let (dt_s, time_s) = (self.dt_s, self.time_s[row]);
+                    let start = Start { dt_s, time_s, told, ends: ends.to_vec(), efforts };
+                    found.push((moving.clone(), start));
+                }
             }
-            moving.show(self, row);
+            // A memory keeps what it has been shown.
+            if self.is_whole(row) && self.is_whole((row + 1).min(self.time_s.len() - 1)) {
+                moving.show(self, row);
+            }
         }
         found
     }
@@ -450,6 +470,11 @@ impl Moving {
 }
 
 impl Told {
+    fn is_finite(&self) -> bool {
+        let pairs = [self.angle, self.speed, [self.pitch, self.rate]];
+        pairs.as_flattened().iter().all(|value| value.is_finite())
+    }
+
     /// As the simulated robot takes it, readings' offsets off.
     fn of_robot(&self, [mount, bias]: [f64; 2], radius_m: f64) -> Followed {
         let (pitch_rad, pitch_rate_rad_s) = (self.pitch - mount, self.rate - bias);
@@ -570,5 +595,68 @@ fn values(moving: &Moving, told: &Told) -> Vec<f64> {
             vec![told.pitch, radius_m * (mean + told.pitch), mean]
         }
         Moving::Axis { .. } => vec![told.angle[0]],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model_file::presets;
+
+    fn bench(dt_s: f64, rows: usize, change: impl Fn(&mut Vec<f64>)) -> Log {
+        let time: Vec<f64> = (0..rows).map(|row| row as f64 * dt_s).collect();
+        let angle = time.iter().map(|t| libm::sin(*t)).collect();
+        let mut torque: Vec<f64> = time.iter().map(|t| 0.01 * libm::cos(*t)).collect();
+        change(&mut torque);
+        Log::from_columns("made", [("time_s", time), ("motor_angle_rad", angle), ("torque_nm", torque)])
+    }
+
+    fn told(log: &Log) -> Vec<Prediction> {
+        predictions(&presets::paper(), std::slice::from_ref(log), Rows::All, Motor::Left, 1)
+    }
+
+    #[test]
+    fn rows_slower_than_the_shortest_prediction_give_none() {
+        assert_eq!(told(&bench(0.2, 400, |_| ())), []);
+        assert_eq!(told(&bench(0.04, 1000, |_| ())).len(), 3);
+    }
+
+    #[test]
+    fn cells_without_a_number_are_gone_round() {
+        let clean = told(&bench(1e-3, 8000, |_| ()));
+        let holed = told(&bench(1e-3, 8000, |torque| torque[1000] = f64::NAN));
+        assert_eq!(holed.len(), clean.len());
+        for value in holed.iter().flat_map(|p| [&p.rmse, &p.motion, &p.noise_floor]) {
+            assert!(value.value.is_finite(), "{holed:?}");
+        }
+        assert_eq!(told(&bench(1e-3, 8000, |torque| torque.fill(f64::NAN))), []);
+    }
+
+    /// The next reading of a slow IMU may be after the last row that a prediction can start from.
+    #[test]
+    fn no_start_is_moved_past_the_end_by_a_slow_imu() {
+        for rows in (2500..2600).step_by(7) {
+            let time: Vec<f64> = (0..rows).map(|row| f64::from(row) * 1e-3).collect();
+            let of = |f: &dyn Fn(f64) -> f64| time.iter().map(|t| f(*t)).collect::<Vec<f64>>();
+            let held = |t: f64| (t * 10.0 + 1e-6).floor() / 10.0;
+            let log = Log::from_columns(
+                "made",
+                [
+                    ("motor_angle_left_rad", of(&|t| t)),
+                    ("motor_angle_right_rad", of(&|t| t)),
+                    ("torque_left_nm", of(&|_| 0.0)),
+                    ("torque_right_nm", of(&|_| 0.0)),
+                    ("pitch_rad", of(&|t| 0.01 * libm::sin(held(t)))),
+                    ("pitch_rate_rad_s", of(&|t| 0.01 * libm::cos(held(t)))),
+                    ("time_s", time.clone()),
+                ],
+            );
+            let record = Record::new(&log, true).unwrap();
+            let starts = record.starts(Rows::All);
+            assert!(starts.is_sorted_by(|a, b| a < b), "{starts:?}");
+            let last = starts.last().unwrap() + record.ahead(1.0) + record.margin();
+            assert!(last < rows as usize, "{starts:?}");
+            assert_eq!(told(&log).len(), 9);
+        }
     }
 }

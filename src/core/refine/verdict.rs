@@ -283,8 +283,8 @@ pub struct Refinement {
     pub unexplained: Unexplained,
     /// What was tried, best first.
     pub candidates: Vec<Tried>,
-    /// The refined model as the plant under the controllers of before and after; none for an axis, and where the model
-    /// stays as it was.
+    /// The refined model as the plant under the controllers of before and after, and what becomes of each effect; without
+    /// runs for an axis and a robot without weights, none where nothing was found.
     pub closed_loop: Option<ClosedLoop>,
     /// What to record next, where it would tell more.
     pub next_experiment: Option<NextExperiment>,
