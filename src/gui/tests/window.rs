@@ -142,7 +142,7 @@ fn margins_have_a_verdict_and_a_sentence_and_poles_a_list() {
     let mut window = open(options(Tab::Tune), SIZE);
     let good = state(&window)["tune_tab"]["margins"].clone();
     assert_eq!(good["stable"], true, "{good:#}");
-    window.get_by_label(&*format!("delay: {}", good["verdicts"]["delay"].as_str().unwrap()));
+    window.get_by_label(&format!("delay: {}", good["verdicts"]["delay"].as_str().unwrap()));
     click(&mut window, "Poles");
     window.get_by_label("damping");
     enter(&mut window, "left torque weight", "1e-5");

@@ -75,12 +75,13 @@ fn as_declared(
     }
 }
 
-/// The picks as effects, harmonics of one kind together.
-pub(super) fn effects(search: &Search<'_>, picks: &[Candidate], fit: &Fit) -> Vec<Found> {
+/// The picks as effects, harmonics of one kind together: their sizes from `fit`, the errors with them from `fitted`, which
+/// is as the log alone has it.
+pub(super) fn effects(search: &Search<'_>, picks: &[Candidate], fit: &Fit, fitted: &Fit) -> Vec<Found> {
     let t = student_t_975(fit.blocks.count().max(2) - 1);
     let placed = search.placed(picks);
     let uncertainty = Uncertainty::new(search, picks, fit);
-    let with = held_out_error(search, picks, fit);
+    let with = held_out_error(search, picks, fitted);
     let mut found: Vec<Found> = Vec::new();
     for (index, (pick, first)) in placed.iter().enumerate() {
         if pick.kind.series && found.iter().any(|other| other.effect.kind() == pick.kind) {

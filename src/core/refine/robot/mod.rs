@@ -13,6 +13,7 @@ mod candidates;
 mod chance;
 mod channels;
 mod found;
+mod gaps;
 mod health;
 mod kernel;
 mod leftover;
@@ -68,8 +69,10 @@ pub(super) fn residual(
 ) -> Result<Residual, RefineError> {
     let robot = robot_of(model, logs)?;
     check_names(&options.estimate)?;
-    let readings = read(logs)?;
-    let mut data_health = health::check(logs.iter().zip(&readings), robot);
+    let pieces = gaps::pieces(logs);
+    let readings = read(&pieces)?;
+    let mut data_health = health::check(pieces.iter().zip(&readings), robot);
+    data_health.extend(gaps::findings(logs));
     report(watch, 0.3)?;
     if health::unfit(&data_health) {
         return Ok(Residual { errors: Errors::default(), tests: Vec::new(), data_health });
@@ -126,9 +129,11 @@ pub(super) fn refine(
 ) -> Result<Refinement, RefineError> {
     let robot = robot_of(model, logs)?;
     check_names(&options.estimate)?;
-    let (training, others) = (read(logs)?, read(held_out)?);
-    let read = logs.iter().zip(&training).chain(held_out.iter().zip(&others));
+    let (pieces, held_pieces) = (gaps::pieces(logs), gaps::pieces(held_out));
+    let (training, others) = (read(&pieces)?, read(&held_pieces)?);
+    let read = pieces.iter().zip(&training).chain(held_pieces.iter().zip(&others));
     let mut data_health = health::check(read, robot);
+    data_health.extend(gaps::findings(logs).into_iter().chain(gaps::findings(held_out)));
     if health::unfit(&data_health) {
         return Ok(unfit(model, data_health));
     }
@@ -267,7 +272,7 @@ fn answer(
     let picks = if explained { search.picks.as_slice() } else { &[] };
     let used = if explained { fit } else { bare };
     let sized = if picks.is_empty() { used.clone() } else { unbiased(search, used.clone(), known, seed) };
-    let mut effects = found::effects(search, picks, &sized);
+    let mut effects = found::effects(search, picks, &sized, used);
     effects.extend(bias);
     let residual =
         |picks: &[candidates::Candidate], fit: &Fit| search.left_raw(picks, &fit.judged.coefficients);

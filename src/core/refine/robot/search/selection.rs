@@ -26,8 +26,6 @@ const LEAST_LOOK: f64 = 8.0;
 const WORTH_REFINING: f64 = 0.3;
 /// What a shape parameter and a unit of caution cost against a rival, in units of the noise.
 const HANDICAP: [f64; 2] = [3.0, 10.0];
-/// Factor on the error of held-out rows from which on a pick does harm.
-const MOST_HARM: f64 = 1.02;
 /// Gain in units of the least one up to which clean robots are asked what chance does.
 const DOUBT: f64 = 3.0;
 
@@ -96,8 +94,7 @@ impl Search<'_> {
             };
             let is_weak = gain < DOUBT * self.least(without.score)
                 && unseen(&self.picks, &with) >= unseen(&others, &without);
-            let harms = held_out_error(self, &self.picks, &with)
-                > MOST_HARM * held_out_error(self, &others, &without);
+            let harms = held_out_error(self, &self.picks, &with) >= held_out_error(self, &others, &without);
             if !pick.kind.trial.brief && (is_weak || harms) {
                 self.picks = others;
             } else {
