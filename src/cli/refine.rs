@@ -45,7 +45,12 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     })
     .map_err(Failure::from_error)?;
     drop(bar);
-    if let Some(path) = &arguments.out {
+    if let (Some(path), Verdict::DataUnfit) = (&arguments.out, found.verdict) {
+        complain(&format!(
+            "{} is not written: the logs cannot answer, so that nothing is refined",
+            path.display()
+        ));
+    } else if let Some(path) = &arguments.out {
         file::write(path, "model", |out| out.write_all(found.model.to_toml().as_bytes()))?;
         complain(&format!("the refined model is in {}", path.display()));
     }
