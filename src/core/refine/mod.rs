@@ -21,6 +21,7 @@ mod closed_loop;
 mod demo;
 mod error;
 mod explorer;
+mod largest;
 mod left_out;
 mod next_experiment;
 mod pages;

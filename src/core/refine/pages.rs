@@ -2,7 +2,7 @@
 //! after, the closed loop, what remains, and what to record next.
 
 use crate::record::{Log, Severity};
-use crate::report::{Block, Cell, Column, Document, Table, Tone};
+use crate::report::{Block, Cell, Column, Document, Table, Tone, capitalised};
 
 use super::closed_loop::{ClosedLoop, LoopRun};
 use super::pictures;
@@ -128,7 +128,7 @@ fn evidence(found: &Refinement, blocks: &mut Vec<Block>) {
         };
         blocks.push(Block::paragraph(format!(
             "{}. With it the error on held-out rows is lower by {:.1} % than with all else alone.{rivals} What shows it best: {}.",
-            sentence(kind.summary),
+            capitalised(kind.summary),
             effect.error_drop_percent,
             kind.separated_by
         )));
@@ -137,11 +137,6 @@ fn evidence(found: &Refinement, blocks: &mut Vec<Block>) {
     if !found.candidates.is_empty() {
         blocks.push(Block::Table(tried(found)));
     }
-}
-
-fn sentence(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
 }
 
 fn tried(found: &Refinement) -> Table {
@@ -353,7 +348,7 @@ fn remains(found: &Refinement, blocks: &mut Vec<Block>) {
     }
     let Some(next) = &found.next_experiment else { return };
     blocks.push(Block::part("What to record next"));
-    blocks.push(Block::paragraph(sentence(&next.summary)));
+    blocks.push(Block::paragraph(capitalised(&next.summary)));
     if let Some(command) = &next.command {
         blocks.push(Block::paragraph(format!("On the simulated robot: {command}")));
     }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::report::{Axis, Chart, Limit, Mark, Panel, Series};
+use crate::report::{Axis, Chart, Limit, Mark, Panel, Series, capitalised};
 
 use super::explorer::{Explorer, Variable};
 use super::verdict::Refinement;
@@ -41,7 +41,7 @@ fn noise(explorer: &Explorer) -> Vec<Limit> {
 }
 
 fn residual_axis(explorer: &Explorer) -> Axis {
-    Axis::new(sentence(&format!("{} residual", explorer.channel)), explorer.unit)
+    Axis::new(capitalised(&format!("{} residual", explorer.channel)), explorer.unit)
 }
 
 fn held(explorer: &Explorer, values: &[f64]) -> Vec<f64> {
@@ -68,7 +68,7 @@ pub(super) fn over(explorer: &Explorer, variable: &Variable) -> Chart {
         title: format!("Residual over {}", in_words(variable)),
         description: "Means of the residual in bins of equally many held-out rows, with bands of 95 %."
             .to_owned(),
-        x: Axis::new(sentence(&in_words(variable)), variable.unit),
+        x: Axis::new(capitalised(in_words(variable).trim_start_matches("the ")), variable.unit),
         panels: vec![Panel::new(residual_axis(explorer), series)],
     }
 }
@@ -89,12 +89,6 @@ fn in_words(variable: &Variable) -> String {
         other => other,
     };
     name.to_owned()
-}
-
-fn sentence(text: &str) -> String {
-    let text = text.strip_prefix("the ").unwrap_or(text);
-    let mut letters = text.chars();
-    letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
 }
 
 struct Bin {

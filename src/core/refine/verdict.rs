@@ -2,9 +2,9 @@
 
 use serde::Serialize;
 
-use crate::effects::{Effect, EffectKind};
+use crate::effects::{Effect, EffectKind, MachineKind};
 use crate::model_file::Model;
-use crate::record::HealthFinding;
+use crate::record::{HealthFinding, Severity};
 use crate::report::Document;
 
 use super::closed_loop::ClosedLoop;
@@ -239,6 +239,19 @@ pub struct Tried {
     pub fate: Fate,
 }
 
+impl Tried {
+    /// Shape parameters in words: as many as are given, of a kind that comes as a series over and over.
+    pub(super) fn detail_of(kind: &EffectKind, shape: &[f64], machine: MachineKind) -> String {
+        let one = |(value, unit): (&f64, &str)| match unit {
+            "1/turn" => format!("order {value:.0}"),
+            "s" if *value < 0.1 => format!("{:.1} ms", 1e3 * value),
+            unit => format!("{value:.3} {unit}"),
+        };
+        let units: Vec<&str> = kind.shapes().map(|parameter| parameter.unit(machine)).collect();
+        shape.iter().zip(units.iter().copied().cycle()).map(one).collect::<Vec<_>>().join(", ")
+    }
+}
+
 impl Serialize for Tried {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         use serde::ser::SerializeMap;
@@ -301,4 +314,28 @@ pub struct Refinement {
     /// Tables and figures.
     #[serde(skip)]
     pub document: Document,
+}
+
+impl Refinement {
+    /// The answer where the logs cannot tell: what to do about the gravest finding is the next thing to do.
+    pub(super) fn unfit(model: &Model, data_health: Vec<HealthFinding>) -> Self {
+        let worst = data_health.iter().find(|finding| finding.severity == Severity::Error);
+        Self {
+            verdict: Verdict::DataUnfit,
+            effects: Vec::new(),
+            before: Errors::default(),
+            after: Errors::default(),
+            unexplained: Unexplained::default(),
+            candidates: Vec::new(),
+            closed_loop: None,
+            next_experiment: worst
+                .or(data_health.first())
+                .map(|finding| NextExperiment::in_words(finding.mend.clone())),
+            data_health,
+            parameters: Vec::new(),
+            model: model.clone(),
+            explorer: Explorer::default(),
+            document: Document::default(),
+        }
+    }
 }

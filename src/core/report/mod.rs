@@ -18,9 +18,11 @@ mod tests;
 mod text;
 mod thin;
 mod ticks;
+mod words;
 
 pub use chart::{Axis, Band, Chart, Limit, Mark, Panel, Scale, Series};
 pub use table::{Cell, Column, Table};
+pub use words::capitalised;
 
 /// A report.
 #[derive(Clone, Debug, Default, PartialEq)]

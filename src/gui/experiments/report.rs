@@ -1,7 +1,7 @@
 //! Both runs as a document and as a chart: what is saved holds what is shown, and how it was made.
 
 use flqr_core::report::{
-    Axis, Block, Cell, Chart, Column, Document, Mark, Panel, Series, Table, Tone, number,
+    Axis, Block, Cell, Chart, Column, Document, Mark, Panel, Series, Table, Tone, capitalised, number,
 };
 
 use super::run::{Recorded, Variant};
@@ -57,7 +57,7 @@ pub(super) fn chart(comparison: &Comparison, range_s: [f64; 2]) -> Chart {
         if let (true, Some((run, values))) = (signal.has_target, target) {
             series.push(Series { mark: Mark::Dashed, ..self::series("target", run, values, range_s) });
         }
-        Panel::new(Axis::new(sentence_case(signal.quantity.name), signal.quantity.unit), series)
+        Panel::new(Axis::new(capitalised(signal.quantity.name), signal.quantity.unit), series)
     };
     let names: Vec<_> = comparison.recorded().map(|(variant, _)| variant.title(scenario)).collect();
     let plotted: Vec<_> = signals.iter().map(|signal| signal.quantity.name).collect();
@@ -66,7 +66,7 @@ pub(super) fn chart(comparison: &Comparison, range_s: [f64; 2]) -> Chart {
         title: format!("{}, {}", scenario.title(), names.join(" and ")),
         description: format!(
             "{} over time, from {} to {} s.{rows}",
-            sentence_case(&plotted.join(", ")),
+            capitalised(&plotted.join(", ")),
             number::significant(range_s[0], 4),
             number::significant(range_s[1], 4)
         ),
@@ -79,11 +79,6 @@ fn series(name: &str, run: &Recorded, values: &[f64], range_s: [f64; 2]) -> Seri
     let inside = run.time_s.partition_point(|time| *time < range_s[0])
         ..run.time_s.partition_point(|time| *time <= range_s[1]);
     Series::new(name, Mark::Line, inside.map(|index| [run.time_s[index], values[index]]))
-}
-
-fn sentence_case(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map(|first| first.to_uppercase().chain(letters).collect()).unwrap_or_default()
 }
 
 fn statistics(comparison: &Comparison, range_s: [f64; 2]) -> Option<Table> {
@@ -99,7 +94,7 @@ fn statistics(comparison: &Comparison, range_s: [f64; 2]) -> Option<Table> {
     columns.extend(["range", "std"].map(|title| Column::grouped("factor", title, "")));
     let row = |(index, signal): (usize, &Signal)| {
         let pair = [0, 1].map(|run: usize| found[run].as_ref().map(|found| found[index]));
-        let name = format!("{}, {}", sentence_case(signal.quantity.name), signal.quantity.unit);
+        let name = format!("{}, {}", capitalised(signal.quantity.name), signal.quantity.unit);
         let numbers = pair.into_iter().flat_map(|summary| {
             summary.map_or([const { Cell::Empty }; 4], |s| {
                 [s.min, s.max, s.mean, s.std].map(|value| Cell::significant(value, 3))

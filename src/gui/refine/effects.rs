@@ -3,6 +3,7 @@
 use egui::{Frame, Grid, RichText, Ui};
 use flqr_core::effects::Place;
 use flqr_core::refine::{Found, NextExperiment, Refinement, Truth, Unexplained, Verdict};
+use flqr_core::report::capitalised;
 use flqr_core::simulate::Scenario;
 
 use super::command::RefineCommand;
@@ -66,7 +67,7 @@ pub(super) fn effect_ui(found: &Found, added: &mut bool, ui: &mut Ui) {
                 ui.label(RichText::new(text).color(palette(ui.visuals()).good));
             }
         });
-        hint_ui(ui, format!("{}. Acts: {}.", sentence_case(kind.summary), place_text(kind.place)));
+        hint_ui(ui, format!("{}. Acts: {}.", capitalised(kind.summary), place_text(kind.place)));
         sizes_ui(found, ui);
         if !found.ambiguous_with.is_empty() {
             let others: Vec<&str> = found.ambiguous_with.iter().map(|kind| kind.id).collect();
@@ -82,7 +83,7 @@ pub(super) fn unexplained_ui(unexplained: &Unexplained, ui: &mut Ui) -> Option<S
         return None;
     }
     section_ui(ui, "Unexplained", |_| {});
-    warning_ui(ui, format!("{}.", sentence_case(&unexplained.description)));
+    warning_ui(ui, format!("{}.", capitalised(&unexplained.description)));
     let mut chosen = None;
     ui.horizontal_wrapped(|ui| {
         for (index, variable) in unexplained.depends_on.iter().enumerate() {
@@ -100,7 +101,7 @@ pub(super) fn unexplained_ui(unexplained: &Unexplained, ui: &mut Ui) -> Option<S
 /// What to record next.
 pub(super) fn next_ui(context: &ViewContext<'_>, next: &NextExperiment, ui: &mut Ui) {
     section_ui(ui, "Next experiment", |_| {});
-    ui.add(egui::Label::new(format!("{}.", sentence_case(&next.summary))).wrap());
+    ui.add(egui::Label::new(format!("{}.", capitalised(&next.summary))).wrap());
     if next.separation.is_finite() && next.separation > 0.0 {
         let separation = shown(next.separation, 3);
         hint_ui(ui, format!("The residuals would be {separation} standard deviations of the noise apart."));
@@ -120,11 +121,6 @@ pub(super) fn next_ui(context: &ViewContext<'_>, next: &NextExperiment, ui: &mut
             ui.ctx().copy_text(command.clone());
         }
     });
-}
-
-fn sentence_case(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map(|first| first.to_uppercase().chain(letters).collect()).unwrap_or_default()
 }
 
 fn sizes_ui(found: &Found, ui: &mut Ui) {

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use flqr_core::control::BalanceController;
 use flqr_core::control::drive::{CheckResult, DriveOrder, Stage};
 use flqr_core::device::{Connection, SessionMode, SessionOptions, SessionOrder, Source, Status, Update};
+use flqr_core::report::capitalised;
 
 use super::feed::{Devices, RobotFeed};
 use crate::history::History;
@@ -253,8 +254,6 @@ impl Drop for Link {
 
 /// An error of the core as a sentence of the window.
 pub(crate) fn sentence(text: &str) -> String {
-    let mut letters = text.chars();
-    let first = letters.next().map(|first| first.to_uppercase().to_string()).unwrap_or_default();
     let end = if text.ends_with('.') { "" } else { "." };
-    format!("{first}{}{end}", letters.as_str())
+    format!("{}{end}", capitalised(text))
 }

@@ -17,12 +17,12 @@ use std::ops::ControlFlow;
 use crate::effects::{self, Effect, MachineKind, Role};
 use crate::identify::quantile::student_t_975;
 use crate::model_file::{Model, Rig};
-use crate::record::{HealthFinding, Log};
+use crate::record::Log;
 use crate::robot::Motor;
 
 use super::error::RefineError;
-use super::verdict::{Corrected, Errors, Found, Refinement, Residual, Unexplained, Verdict};
-use super::{Explorer, NextExperiment, Options};
+use super::verdict::{Corrected, Found, Refinement, Residual, Unexplained, Verdict};
+use super::{Explorer, Options};
 use candidates::{Scales, library};
 use errors::errors;
 use floor::Floor;
@@ -104,7 +104,7 @@ pub(super) fn refine(
     data_health.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
     let unfit = data_health.iter().any(|finding| finding.severity == crate::record::Severity::Error);
     if unfit {
-        return Ok(unfit_refinement(model, data_health));
+        return Ok(Refinement::unfit(model, data_health));
     }
     let whitener = search::whitener(&rows, declared.inertia);
     let white = White::new(&rows, &whitener, &nuisances, [&measured, &target], declared.inertia);
@@ -118,7 +118,7 @@ pub(super) fn refine(
         Search::new(&rows, &declared.machine, &nuisances, &target, (&whitener, &white, &library));
     let Some(first) = search.fit(&[]) else {
         data_health.push(health::inseparable(&declared));
-        return Ok(unfit_refinement(model, data_health));
+        return Ok(Refinement::unfit(model, data_health));
     };
     let before_left = search.residual(&first.judged.coefficients);
     let first_error = first.judged.error() / first.blocks.rows() as f64;
@@ -278,24 +278,6 @@ fn little([before, after]: [f64; 2], floor: &Floor) -> bool {
     floor.measured
         && after > FAR_OVER_FLOOR * floor.variance.sqrt()
         && explained < LITTLE * (before * before - floor.variance)
-}
-
-fn unfit_refinement(model: &Model, data_health: Vec<HealthFinding>) -> Refinement {
-    Refinement {
-        verdict: Verdict::DataUnfit,
-        effects: Vec::new(),
-        before: Errors::default(),
-        after: Errors::default(),
-        unexplained: Unexplained::default(),
-        candidates: Vec::new(),
-        closed_loop: None,
-        next_experiment: data_health.first().map(|finding| NextExperiment::in_words(finding.mend.clone())),
-        data_health,
-        parameters: Vec::new(),
-        model: model.clone(),
-        explorer: Explorer::default(),
-        document: Default::default(),
-    }
 }
 
 fn unexplained(declared: &Declared, structure: &[Dependence], over_floor: Option<f64>) -> Unexplained {

@@ -4,12 +4,12 @@
 //! The recorded motion, smoothed, is the true one; the effort that it takes is worked out, both are measured anew. So
 //! nothing has to be tracked, and the columns of the library stay as they are but for noise that none of them shows.
 
-use std::f64::consts::PI;
 use std::num::NonZeroUsize;
 
 use crate::friction::Stribeck;
 use crate::identify::filter::derivative;
 use crate::parallel;
+use crate::refine::largest::exceeded_by;
 use crate::refine::whiten::Whitener;
 use crate::simulate::Noise;
 
@@ -77,7 +77,8 @@ pub(super) fn thresholds(
         let target: Vec<f64> = rows.rows.iter().map(|row| measured[row.trace][row.sample]).collect();
         search.best_of_noise(&gram, candidates, &whitener.apply(&target))
     });
-    Thresholds::default().raised(tail(found.into_iter().flatten()))
+    let largest: Vec<f64> = found.into_iter().flatten().collect();
+    Thresholds::default().raised(exceeded_by(&largest, LEVEL, 0.0))
 }
 
 /// What the declared chain leaves of a clean motor's effort.
@@ -125,30 +126,9 @@ fn encoder_step(position: &[f64]) -> f64 {
     if all > 0 && 10 * whole > 9 * all { step } else { 0.0 }
 }
 
-/// The value that a share [`LEVEL`] of largest values exceeds, if they are distributed as Gumbel's.
-fn tail(values: impl Iterator<Item = f64> + Clone) -> f64 {
-    const EULER: f64 = 0.577_215_664_901_532_9;
-    let count = values.clone().count() as f64;
-    if count < 2.0 {
-        return 0.0;
-    }
-    let mean = values.clone().sum::<f64>() / count;
-    let variance = values.map(|value| (value - mean).powi(2)).sum::<f64>() / (count - 1.0);
-    let scale = (6.0 * variance).sqrt() / PI;
-    mean - EULER * scale - scale * libm::log(-libm::log1p(-LEVEL))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_tail_of_largest_values_is_gumbels() {
-        // Quantiles of the standard Gumbel distribution, evenly in probability.
-        let values = (0..4000).map(|i| -(-((f64::from(i) + 0.5) / 4000.0).ln()).ln());
-        let expected = -(-(0.99_f64.ln())).ln();
-        assert!((tail(values) - expected).abs() < 0.05);
-    }
 
     #[test]
     fn an_encoder_shows_its_step() {

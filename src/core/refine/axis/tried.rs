@@ -1,6 +1,6 @@
 //! What was tried, best first, and what became of it.
 
-use crate::effects::{EffectKind, MachineKind};
+use crate::effects::MachineKind;
 use crate::refine::verdict::{Fate, Found, Tried};
 
 use super::search::{Alone, Thresholds};
@@ -27,22 +27,10 @@ pub(super) fn tried(
     };
     let told = |alone: &Alone| Tried {
         kind: alone.kind,
-        detail: detail(alone.kind, &alone.shape, machine),
+        detail: Tried::detail_of(alone.kind, &alone.shape, machine),
         gain_percent: 100.0 * alone.gain,
         z: alone.z,
         fate: fate(alone),
     };
     alone.iter().map(told).collect()
-}
-
-/// A shape in words.
-fn detail(kind: &EffectKind, shape: &[f64], machine: MachineKind) -> String {
-    let one = |(value, unit): (&f64, &str)| match unit {
-        "1/turn" => format!("order {value:.0}"),
-        "s" if *value < 1.0 => format!("{:.1} ms", 1e3 * value),
-        "m" if *value < 1.0 => format!("{:.2} mm", 1e3 * value),
-        unit => format!("{value:.3} {unit}"),
-    };
-    let units: Vec<&str> = kind.shapes().map(|parameter| parameter.unit(machine)).collect();
-    shape.iter().zip(units.iter().copied().cycle()).map(one).collect::<Vec<_>>().join(", ")
 }

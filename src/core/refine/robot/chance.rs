@@ -3,6 +3,7 @@
 use std::num::NonZeroUsize;
 
 use crate::parallel;
+use crate::refine::largest::exceeded_by;
 
 use super::candidates::library;
 use super::channels::Channels;
@@ -13,8 +14,8 @@ use super::twin::{Levels, Twin};
 /// Clean robots, and the share of such sets of effects that the largest of them may exceed.
 const ROBOTS: u64 = 10;
 const LEVEL: f64 = 0.01;
-/// Spread of the largest of many gains: that of the largest of many χ² is 2, and no fewer are believed.
-const LEAST_SPREAD: f64 = 2.0;
+/// Scale of the largest of many gains: that of the largest of many χ² is 2, and no smaller one is believed.
+const LEAST_SCALE: f64 = 2.0;
 /// Threads that share the robots; the answer does not depend on them.
 pub(super) const THREADS: NonZeroUsize = NonZeroUsize::new(4).expect("four");
 
@@ -24,7 +25,7 @@ pub(super) fn largest_gain(twin: &Twin<'_>, levels: Levels, seed: u64) -> f64 {
         (1..=ROBOTS).map(|robot| seed.wrapping_mul(ROBOTS + 1).wrapping_add(robot)).collect();
     let gains: Vec<f64> =
         parallel::map(&seeds, THREADS, |&seed| largest(twin, levels, seed)).into_iter().flatten().collect();
-    quantile_of_largest(&gains)
+    exceeded_by(&gains, LEVEL, LEAST_SCALE)
 }
 
 /// The largest gain that anything has in one clean robot.
@@ -35,17 +36,4 @@ fn largest(twin: &Twin<'_>, levels: Levels, seed: u64) -> Option<f64> {
     let (mut free, mut tried) = (nuisances(&trace, twin.known), library(&trace));
     whitened(&mut tried, &mut free, &channels);
     Some(Search::new(&trace, &channels, &free, &tried, &target, &|| 0.0).largest())
-}
-
-/// Quantile 1 − [`LEVEL`] of a Gumbel distribution through the largest gains by their mean and spread.
-fn quantile_of_largest(gains: &[f64]) -> f64 {
-    if gains.len() < 3 {
-        return 0.0;
-    }
-    const EULER: f64 = 0.577_215_664_901_532_9;
-    let count = gains.len() as f64;
-    let mean = gains.iter().sum::<f64>() / count;
-    let variance = gains.iter().map(|gain| (gain - mean).powi(2)).sum::<f64>() / (count - 1.0);
-    let spread = (variance.sqrt() * 6_f64.sqrt() / std::f64::consts::PI).max(LEAST_SPREAD);
-    mean + spread * (-libm::log(-libm::log1p(-LEVEL)) - EULER)
 }

@@ -4,7 +4,8 @@ use std::f64::consts::TAU;
 
 use crate::effects::{Action, Moment};
 
-use super::search::{Search, dot};
+use super::kernel::dot;
+use super::search::Search;
 
 /// Rows of a piece of the spectrum, and places on each side whose median is the level about a line.
 const PIECE: usize = 256;

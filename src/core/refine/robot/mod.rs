@@ -35,9 +35,9 @@ use crate::record::{HealthFinding, Log, LogKind, Severity};
 
 use super::error::RefineError;
 use super::verdict::{
-    Channels as PerChannel, Corrected, Errors, Found, Quantity, Refinement, Residual, Unexplained, Verdict,
+    Channels as PerChannel, Corrected, Errors, Found, Quantity, Refinement, Residual, Verdict,
 };
-use super::{Explorer, NextExperiment, Options, Variable};
+use super::{Explorer, Options, Variable};
 use candidates::library;
 use channels::Channels;
 use motion::Readings;
@@ -135,7 +135,7 @@ pub(super) fn refine(
     let mut data_health = health::check(read, robot);
     data_health.extend(gaps::findings(logs).into_iter().chain(gaps::findings(held_out)));
     if health::unfit(&data_health) {
-        return Ok(unfit(model, data_health));
+        return Ok(Refinement::unfit(model, data_health));
     }
     let is_late = torques_are_late(robot, &training);
     let of_log = |log: Readings| if is_late { log.acting(robot) } else { log.without_offsets(robot) };
@@ -145,7 +145,7 @@ pub(super) fn refine(
     let mut trace = Trace::new(robot, training, others);
     data_health.extend(health::check_motion(&trace));
     if data_health.iter().any(|finding| finding.severity == Severity::Error) {
-        return Ok(unfit(model, data_health));
+        return Ok(Refinement::unfit(model, data_health));
     }
     let known = Known { tolerances: &model.tolerance, estimate: &options.estimate };
     let mut channels = Channels::new(&trace, &trace.residual());
@@ -164,7 +164,7 @@ pub(super) fn refine(
             search.merge_pushes();
             search.confirm();
         }
-        let Some(fit) = search.fit(&search.picks) else { return Ok(unfit(model, data_health)) };
+        let Some(fit) = search.fit(&search.picks) else { return Ok(Refinement::unfit(model, data_health)) };
         let last = pass == 1 || search.picks.is_empty();
         if last {
             return Ok(answer(model, &search, &fit, (bias, known, options.seed), data_health));
@@ -174,7 +174,7 @@ pub(super) fn refine(
         channels = Channels::new(&trace, &left);
         trace.refill(&loads, 0.0);
     }
-    Ok(unfit(model, data_health))
+    Ok(Refinement::unfit(model, data_health))
 }
 
 /// A clean robot that stands in for the recorded one, with its noise; none where it cannot be simulated.
@@ -228,25 +228,6 @@ fn check_names(names: &[String]) -> Result<(), RefineError> {
     match names.iter().find(|name| *name != "all" && !KEYS.contains(&name.as_str())) {
         Some(name) => Err(RefineError::UnknownParameter { name: name.clone(), allowed: KEYS.join(", ") }),
         None => Ok(()),
-    }
-}
-
-fn unfit(model: &Model, data_health: Vec<HealthFinding>) -> Refinement {
-    let worst = data_health.iter().find(|finding| finding.severity == Severity::Error);
-    Refinement {
-        verdict: Verdict::DataUnfit,
-        effects: Vec::new(),
-        before: Errors::default(),
-        after: Errors::default(),
-        unexplained: Unexplained::default(),
-        candidates: Vec::new(),
-        closed_loop: None,
-        next_experiment: worst.map(|finding| NextExperiment::in_words(finding.mend.clone())),
-        data_health,
-        parameters: Vec::new(),
-        model: model.clone(),
-        explorer: Explorer::default(),
-        document: Default::default(),
     }
 }
 

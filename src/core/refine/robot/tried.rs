@@ -19,7 +19,11 @@ pub(super) fn tried(search: &Search<'_>, effects: &[Found]) -> Vec<Tried> {
         let z = search.z(candidate, fit);
         Tried {
             kind: candidate.kind,
-            detail: detail(candidate),
+            detail: Tried::detail_of(
+                candidate.kind,
+                &candidate.shape[..candidate.shape.len().min(1)],
+                MachineKind::Robot,
+            ),
             gain_percent: 100.0 * gain / bare.score,
             z,
             fate: fate(search, effects, candidate.kind, gain, &bare, z),
@@ -65,16 +69,4 @@ fn untestable(search: &Search<'_>) -> Vec<Tried> {
         .filter(|kind| (f64::NEG_INFINITY..TESTABLE).contains(&own(kind)) && own(kind).is_finite())
         .map(|kind| Tried { kind, detail: String::new(), gain_percent: 0.0, z: 0.0, fate: Fate::NotTestable })
         .collect()
-}
-
-/// The first shape parameter in words.
-fn detail(candidate: &Candidate) -> String {
-    let Some((parameter, value)) = candidate.kind.shapes().zip(&candidate.shape).next() else {
-        return String::new();
-    };
-    match parameter.unit(MachineKind::Robot) {
-        "1/turn" => format!("order {value:.0}"),
-        "s" if *value < 0.1 => format!("{:.1} ms", 1e3 * value),
-        unit => format!("{value:.3} {unit}"),
-    }
 }

@@ -9,7 +9,8 @@ use nalgebra::{DMatrix, DVector};
 use crate::refine::select::Member;
 
 use super::candidates::Candidate;
-use super::search::{Fit, Search, dot};
+use super::kernel::dot;
+use super::search::{Fit, Search};
 
 /// Standard errors.
 pub(super) struct Uncertainty {

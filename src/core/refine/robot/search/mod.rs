@@ -10,7 +10,7 @@ use nalgebra::DMatrix;
 
 use crate::refine::select::{Blocks, Judged, Member};
 
-pub(super) use screen::{Screen, dot};
+pub(super) use screen::Screen;
 pub(super) use selection::LEAST_Z;
 
 use super::candidates::Candidate;

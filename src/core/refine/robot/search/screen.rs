@@ -3,6 +3,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::{Candidate, Search};
+use crate::refine::robot::kernel::dot;
 
 /// What single candidates would gain beside nuisances and picks.
 pub(in crate::refine::robot) struct Screen<'a> {
@@ -83,15 +84,4 @@ impl<'a> Screen<'a> {
         let value = values[0].clamp(bounds[0][0], bounds[0][1]);
         2.0 * value * right[0] - value * value / values[0] * right[0]
     }
-}
-
-pub(in crate::refine::robot) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; 8];
-    let cut = a.len() / 8 * 8;
-    for (a, b) in a[..cut].chunks_exact(8).zip(b[..cut].chunks_exact(8)) {
-        for lane in 0..8 {
-            sums[lane] += a[lane] * b[lane];
-        }
-    }
-    sums.iter().sum::<f64>() + a[cut..].iter().zip(&b[cut..]).map(|(a, b)| a * b).sum::<f64>()
 }
