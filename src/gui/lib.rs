@@ -27,6 +27,7 @@ mod layout;
 mod live;
 mod load;
 mod messages;
+mod panes;
 mod picture;
 pub mod plot;
 mod quantity;

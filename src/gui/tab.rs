@@ -72,10 +72,9 @@ impl Tab {
     /// Width below which a tile scrolls its page sideways.
     pub(crate) fn least_width(self) -> f32 {
         match self {
-            Self::Tune => 860.0,
-            Self::Friction | Self::Refine | Self::Experiments => 900.0,
-            Self::Robot => 640.0,
-            Self::Runs => 760.0,
+            Self::Tune | Self::Friction | Self::Refine | Self::Experiments | Self::Robot | Self::Runs => {
+                400.0
+            }
             Self::Log => 240.0,
         }
     }

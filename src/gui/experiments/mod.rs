@@ -18,15 +18,14 @@ mod table;
 
 use std::path::{Path, PathBuf};
 
-use egui::{
-    CentralPanel, Color32, Context, Frame, Margin, Panel, Rect, RichText, ScrollArea, Ui, Vec2, vec2,
-};
+use egui::{Color32, Context, Rect, RichText, Ui, Vec2, vec2};
 use flqr_core::model_file::{Model, RobotModel};
 use flqr_core::simulate::{Scenario, Summary};
 
 use crate::command::{Commands, FilePurpose};
 use crate::context::ViewContext;
 use crate::job::Waker;
+use crate::panes::{MARGIN, Pane, panes_ui};
 use crate::plot::Marks;
 use crate::runs::RunsTab;
 use crate::theme::palette;
@@ -236,42 +235,42 @@ impl ExperimentsTab {
     pub(crate) fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
         let arrows = !self.plots.stack.has_cursors();
         self.playback.keys(ui, arrows, &mut self.marks);
-        let side = Frame::side_top_panel(ui.style()).inner_margin(Margin::symmetric(10, 6));
-        Panel::left("experiment")
-            .frame(side)
-            .resizable(true)
-            .default_size(260.0)
-            .size_range(240.0..=420.0)
-            .show(ui, |ui| {
-                ScrollArea::vertical().show(ui, |ui| {
-                    let form = (&mut self.settings, &mut self.limited);
-                    form::ui(context, form, &mut self.preflight, &self.runs, ui);
-                    self.outcome_ui(context, ui);
-                    if self.runs.comparison().is_some() {
-                        self.saver.ui(context, ui);
-                    }
-                });
+        let form = Pane::left(Part::Form, "Experiment", 260.0, 240.0..=420.0);
+        let Some(comparison) = self.runs.comparison().cloned() else {
+            let panes = [form, Pane::middle(Part::Plots, "Plots", 300.0)];
+            panes_ui(ui, "no experiment", &panes, |part, ui| match part {
+                Part::Form => self.form_ui(context, ui),
+                _ => empty_ui(ui),
             });
-        if let Some(comparison) = self.runs.comparison().cloned() {
-            self.marks.range = self.table.range(&comparison, self.plots.stack.view.range());
-            self.marks.shade = self.table.choice != Choice::Visible && self.marks.range != self.marks.limits;
-            self.page = ui.available_rect_before_wrap();
-            let width = (0.29 * ui.ctx().content_rect().width()).clamp(372.0, 560.0);
-            Panel::right("robot")
-                .frame(side)
-                .resizable(true)
-                .default_size(width)
-                .size_range(300.0..=900.0)
-                .show(ui, |ui| {
-                    let height = ui.available_height();
-                    ScrollArea::vertical().show(ui, |ui| self.robot_ui(&comparison, ui, height));
-                });
-            let middle = Frame::central_panel(ui.style()).inner_margin(Margin::symmetric(10, 6));
-            CentralPanel::default()
-                .frame(middle)
-                .show(ui, |ui| self.plots_ui(&comparison, context.commands, ui));
-        } else {
-            CentralPanel::default().show(ui, empty_ui);
+            return;
+        };
+        self.marks.range = self.table.range(&comparison, self.plots.stack.view.range());
+        self.marks.shade = self.table.choice != Choice::Visible && self.marks.range != self.marks.limits;
+        let page = ui.available_rect_before_wrap();
+        self.page = page;
+        let width = (0.29 * ui.ctx().content_rect().width()).clamp(372.0, 560.0);
+        let panes = [
+            form,
+            Pane::middle(Part::Plots, "Plots", 400.0),
+            Pane::right(Part::Robot, "Robot and statistics", width, 300.0..=900.0),
+        ];
+        panes_ui(ui, "experiments", &panes, |part, ui| match part {
+            Part::Form => self.form_ui(context, ui),
+            Part::Plots => {
+                // A picture of the page leaves the form out.
+                self.page = page.with_min_x(ui.max_rect().left() - MARGIN);
+                self.plots_ui(&comparison, context.commands, ui);
+            }
+            Part::Robot => self.robot_ui(&comparison, ui, page.height()),
+        });
+    }
+
+    fn form_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
+        let form = (&mut self.settings, &mut self.limited);
+        form::ui(context, form, &mut self.preflight, &self.runs, ui);
+        self.outcome_ui(context, ui);
+        if self.runs.comparison().is_some() {
+            self.saver.ui(context, ui);
         }
     }
 
@@ -394,6 +393,14 @@ fn dials_ui(comparison: &Comparison, time_s: f64, ui: &mut Ui, size: Vec2) {
         let dials = Dials { title, color: colors[variant as usize], run, speeds: &speeds, time_s };
         dials.ui(ui, size);
     }
+}
+
+/// The panes of the page.
+#[derive(Clone, Copy)]
+enum Part {
+    Form,
+    Plots,
+    Robot,
 }
 
 fn snapshot_of(

@@ -9,7 +9,7 @@ mod source;
 
 use std::path::Path;
 
-use egui::{CentralPanel, Frame, Margin, Panel, ScrollArea, Ui};
+use egui::Ui;
 use flqr_core::model_file::Model;
 
 use crate::column_map::ColumnMapForm;
@@ -17,6 +17,7 @@ use crate::command::FilePurpose;
 use crate::context::ViewContext;
 use crate::job::Waker;
 use crate::load::Loader;
+use crate::panes::{Pane, panes_ui};
 use fit::FitRun;
 pub(crate) use fitted::Fitted;
 use preview::Preview;
@@ -131,34 +132,38 @@ impl FrictionTab {
     }
 
     pub(crate) fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
-        let side = Frame::side_top_panel(ui.style()).inner_margin(Margin::symmetric(10, 6));
-        Panel::left("log").frame(side).resizable(true).default_size(330.0).size_range(280.0..=480.0).show(
-            ui,
-            |ui| {
-                ScrollArea::vertical().show(ui, |ui| {
-                    self.source.ui(context, &self.loader, ui);
-                    source::health_ui(&self.loader, ui);
-                    self.fit.options_ui(context, self.loader.log().is_some(), ui);
-                });
-            },
-        );
-        Panel::right("result")
-            .frame(side)
-            .resizable(true)
-            .default_size(300.0)
-            .size_range(250.0..=460.0)
-            .show(ui, |ui| {
-                ScrollArea::vertical().show(ui, |ui| result::ui(context, &self.fit, ui));
-            });
-        let middle = Frame::central_panel(ui.style()).inner_margin(Margin::symmetric(10, 6));
-        CentralPanel::default().frame(middle).show(ui, |ui| {
-            let half = 0.5 * ui.available_height();
-            ui.allocate_ui(egui::vec2(ui.available_width(), half), |ui| {
-                ui.set_min_height(half);
-                self.preview.ui(context, &self.loader, ui);
-            });
-            let kind = self.loader.log().and_then(|loaded| loaded.kind.as_ref().ok().copied());
-            charts::ui(context, &self.fit, kind, ui);
+        let panes = [
+            Pane::left(Part::Log, "Log and fit", 330.0, 280.0..=480.0),
+            Pane::middle(Part::Plots, "Plots", 380.0),
+            Pane::right(Part::Result, "Result", 300.0, 250.0..=460.0),
+        ];
+        panes_ui(ui, "friction", &panes, |part, ui| match part {
+            Part::Log => {
+                self.source.ui(context, &self.loader, ui);
+                source::health_ui(&self.loader, ui);
+                self.fit.options_ui(context, self.loader.log().is_some(), ui);
+            }
+            Part::Plots => self.plots_ui(context, ui),
+            Part::Result => result::ui(context, &self.fit, ui),
         });
     }
+
+    /// The log above what the fit makes of it.
+    fn plots_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
+        let half = 0.5 * ui.available_height();
+        ui.allocate_ui(egui::vec2(ui.available_width(), half), |ui| {
+            ui.set_min_height(half);
+            self.preview.ui(context, &self.loader, ui);
+        });
+        let kind = self.loader.log().and_then(|loaded| loaded.kind.as_ref().ok().copied());
+        charts::ui(context, &self.fit, kind, ui);
+    }
+}
+
+/// The panes of the page.
+#[derive(Clone, Copy)]
+enum Part {
+    Log,
+    Plots,
+    Result,
 }

@@ -15,7 +15,7 @@ mod strip;
 
 use std::path::{Path, PathBuf};
 
-use egui::{CentralPanel, Frame, Margin, Panel, RichText, ScrollArea, Ui};
+use egui::{Frame, Margin, Panel, RichText, ScrollArea, Ui};
 use flqr_core::model_file::Model;
 use flqr_core::refine::{Refinement, Verdict};
 use flqr_core::report::{Block, Tone as ReportTone};
@@ -25,6 +25,7 @@ use crate::column_map::ColumnMapForm;
 use crate::command::Command;
 use crate::context::ViewContext;
 use crate::job::Waker;
+use crate::panes::{Pane, panes_ui};
 use crate::session::Session;
 use crate::theme::palette;
 use crate::widgets::{hint_ui, section_ui, warning_ui};
@@ -314,30 +315,30 @@ impl RefineTab {
         let side = Frame::side_top_panel(ui.style()).inner_margin(Margin::symmetric(10, 6));
         let states = self.states(context.session);
         Panel::top("steps of the loop").frame(side).show(ui, |ui| strip::ui(&mut self.step, &states, ui));
-        Panel::left("refine sources")
-            .frame(side)
-            .resizable(true)
-            .default_size(330.0)
-            .size_range(280.0..=480.0)
-            .show(ui, |ui| {
-                ScrollArea::vertical().show(ui, |ui| {
-                    self.sources.ui(context, ui);
-                    form::ui(context, &mut self.settings, &self.sources, &self.run, ui);
-                    self.commands_ui(context, ui);
-                    if self.run.refined.is_some() {
-                        self.saver.ui(context, ui);
-                    }
-                });
-            });
-        let middle = Frame::central_panel(ui.style()).inner_margin(Margin::symmetric(10, 6));
-        CentralPanel::default().frame(middle).show(ui, |ui| {
-            self.stale_ui(context, ui);
-            if self.step == Step::Residual && (self.run.refined.is_some() || self.run.residual.is_some()) {
-                self.residual.ui(self.run.refined.as_ref(), self.run.residual.as_ref(), ui);
-            } else {
-                ScrollArea::both().auto_shrink(false).show(ui, |ui| self.step_ui(context, ui));
+        let panes = [
+            Pane::left(Part::Sources, "Logs and search", 330.0, 280.0..=480.0),
+            Pane::middle(Part::Step, "Step of the loop", 380.0),
+        ];
+        panes_ui(ui, "refine", &panes, |part, ui| match part {
+            Part::Sources => {
+                self.sources.ui(context, ui);
+                form::ui(context, &mut self.settings, &self.sources, &self.run, ui);
+                self.commands_ui(context, ui);
+                if self.run.refined.is_some() {
+                    self.saver.ui(context, ui);
+                }
             }
+            Part::Step => self.step_pane_ui(context, ui),
         });
+    }
+
+    fn step_pane_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
+        self.stale_ui(context, ui);
+        if self.step == Step::Residual && (self.run.refined.is_some() || self.run.residual.is_some()) {
+            self.residual.ui(self.run.refined.as_ref(), self.run.residual.as_ref(), ui);
+        } else {
+            ScrollArea::both().auto_shrink(false).show(ui, |ui| self.step_ui(context, ui));
+        }
     }
 
     fn states(&self, session: &Session) -> [StepState; 5] {
@@ -430,6 +431,13 @@ impl RefineTab {
             hint_ui(ui, "No file holds this very model: save it, put its path in place of MODEL.toml.");
         }
     }
+}
+
+/// The panes under the steps.
+#[derive(Clone, Copy)]
+enum Part {
+    Sources,
+    Step,
 }
 
 /// The way into the session's model.

@@ -17,9 +17,7 @@ mod snapshot;
 use std::path::Path;
 use std::sync::Arc;
 
-use egui::{
-    Button, CentralPanel, Frame, Label, Margin, Panel, RichText, ScrollArea, Sense, Ui, UiBuilder, vec2,
-};
+use egui::{Button, Frame, Label, Margin, RichText, ScrollArea, Sense, Ui, UiBuilder, vec2};
 use flqr_core::control::drive::Stage;
 use flqr_core::device::{Connection, Interfaces, SessionOptions, Source as DeviceSource, Update};
 use flqr_core::robot::LinkSettings;
@@ -27,6 +25,7 @@ use flqr_core::robot::LinkSettings;
 use crate::command::{Command, FilePurpose, Source};
 use crate::context::ViewContext;
 use crate::job::{Job, Outcome, Waker};
+use crate::panes::{Pane, panes_ui};
 use crate::recent::Recent;
 use crate::theme::palette;
 use crate::widgets::{hint_ui, section_ui};
@@ -143,16 +142,15 @@ impl RobotTab {
 
     /// The page; says whether STOP was pressed.
     pub(crate) fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) -> bool {
-        let side = Frame::side_top_panel(ui.style()).inner_margin(Margin::symmetric(10, 6));
-        let stop = Panel::left("connection")
-            .frame(side)
-            .resizable(true)
-            .default_size(280.0)
-            .size_range(250.0..=420.0)
-            .show(ui, |ui| ScrollArea::vertical().show(ui, |ui| self.side_ui(context, ui)).inner)
-            .inner;
-        let middle = Frame::central_panel(ui.style()).inner_margin(Margin::symmetric(10, 6));
-        CentralPanel::default().frame(middle).show(ui, |ui| self.middle_ui(context, ui));
+        let panes = [
+            Pane::left(Part::Connection, "Connection", 280.0, 250.0..=420.0),
+            Pane::middle(Part::Robot, "Robot", 340.0),
+        ];
+        let mut stop = false;
+        panes_ui(ui, "robot", &panes, |part, ui| match part {
+            Part::Connection => stop |= self.side_ui(context, ui),
+            Part::Robot => self.middle_ui(context, ui),
+        });
         stop
     }
 
@@ -232,6 +230,13 @@ impl RobotTab {
             self.events.ui(ui);
         });
     }
+}
+
+/// The panes of the page.
+#[derive(Clone, Copy)]
+enum Part {
+    Connection,
+    Robot,
 }
 
 /// Why the robot was stopped, or why nothing is heard, in large letters, with the mend.

@@ -16,6 +16,7 @@ use flqr_core::device::RecordingStatus;
 use flqr_core::model_file::Model;
 
 use crate::context::ViewContext;
+use crate::panes::{Pane, panes_ui};
 use crate::widgets::hint_ui;
 use changes::Changes;
 pub(crate) use command::RunsCommand;
@@ -146,15 +147,22 @@ impl RunsTab {
                 let undo = !self.deleted.is_empty();
                 self.table.ui(context, &self.ledger, &mut self.ticked, undo, ui);
             });
-        let side = Frame::side_top_panel(ui.style()).inner_margin(Margin::symmetric(10, 6));
-        Panel::right("run changes")
-            .frame(side)
-            .resizable(true)
-            .default_size(360.0)
-            .size_range(240.0..=640.0)
-            .show(ui, |ui| self.changes.ui(&self.ledger, ui));
-        CentralPanel::default().frame(frame).show(ui, |ui| self.overlay.ui(&self.ledger, &self.ticked, ui));
+        let panes = [
+            Pane::middle(Part::Overlay, "Runs over each other", 390.0),
+            Pane::right(Part::Changes, "What changed", 360.0, 240.0..=640.0),
+        ];
+        panes_ui(ui, "runs", &panes, |part, ui| match part {
+            Part::Overlay => self.overlay.ui(&self.ledger, &self.ticked, ui),
+            Part::Changes => self.changes.ui(&self.ledger, ui),
+        });
     }
+}
+
+/// The panes under the table.
+#[derive(Clone, Copy)]
+enum Part {
+    Overlay,
+    Changes,
 }
 
 fn listed(numbers: impl Iterator<Item = u64>) -> String {

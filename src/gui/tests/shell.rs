@@ -64,7 +64,9 @@ fn pages_are_shown_beside_each_other_and_put_back() {
     command(&mut window, "Friction to the right");
     assert_eq!(state(&window)["shown"], json!(["tune", "friction"]));
     assert_eq!(state(&window)["tab"], "friction", "it is the page that keys are about");
+    click(&mut window, "Weights and gains");
     window.get_by_label("pitch weight slider");
+    click(&mut window, "Log and fit");
     window.get_by_label("log path");
     command(&mut window, "Experiments to the bottom");
     let shown = state(&window);
@@ -127,4 +129,43 @@ fn the_menus_and_the_list_of_keys_are_made_of_the_commands() {
     assert_eq!(state(&window)["shown"], json!(["tune", "friction"]));
     click(&mut window, "Keys");
     window.get_by_label("STOP a robot that is checked or driven: no torque, motors off");
+}
+
+#[test]
+fn in_a_narrow_window_the_panes_of_a_page_are_behind_their_names() {
+    let mut window = open(options(Tab::Tune), egui::vec2(640.0, 760.0));
+    assert!(window.query_by_label("body mass").is_none(), "the plots are in front");
+    click(&mut window, "Model");
+    window.get_by_label("body mass");
+    assert!(window.query_by_label("Predicted").is_none());
+    click(&mut window, "Robot and prediction");
+    window.get_by_label("Predicted");
+    let wide = open(options(Tab::Tune), SIZE);
+    wide.get_by_label("body mass");
+    wide.get_by_label("Predicted");
+    assert!(
+        wide.query_by_label("Robot and prediction").is_none(),
+        "where all have room, no names are needed"
+    );
+}
+
+#[test]
+fn nothing_of_a_page_lies_beyond_the_window() {
+    use egui_kittest::kittest::NodeT;
+    for tab in Tab::ALL {
+        for width in [640.0, 900.0, SIZE.x] {
+            let window = open(options(tab), egui::vec2(width, 760.0));
+            let beyond: Vec<_> = window
+                .root()
+                .children_recursive()
+                .filter(|node| {
+                    node.accesskit_node()
+                        .raw_bounds()
+                        .is_some_and(|bounds| bounds.x1 > f64::from(width) + 1.0)
+                })
+                .map(|node| format!("{:?}", node.accesskit_node().label()))
+                .collect();
+            assert!(beyond.is_empty(), "{} at {width}: {beyond:?}", tab.title());
+        }
+    }
 }

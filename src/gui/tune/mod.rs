@@ -15,11 +15,12 @@ mod weights;
 
 use std::path::{Path, PathBuf};
 
-use egui::{CentralPanel, Frame, Margin, Panel, ScrollArea, Ui};
+use egui::{CentralPanel, Frame, Margin, Panel, Ui};
 
 use crate::command::{Command, FilePurpose, Source};
 use crate::context::ViewContext;
 use crate::design::Designer;
+use crate::panes::{Pane, panes_ui};
 use crate::session::Session;
 use crate::tab::Tab;
 use crate::widgets::hint_ui;
@@ -114,33 +115,34 @@ impl TuneTab {
     }
 
     pub(crate) fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
-        let side = Frame::side_top_panel(ui.style()).inner_margin(Margin::symmetric(10, 6));
-        Panel::right("model").frame(side).resizable(true).default_size(252.0).size_range(220.0..=420.0).show(
-            ui,
-            |ui| {
-                ScrollArea::vertical().show(ui, |ui| {
-                    self.files.ui(context, ui);
-                    self.parameters.ui(context, ui);
-                });
-            },
-        );
+        let model = Pane::right(Part::Model, "Model", 252.0, 220.0..=420.0);
         if context.session.robot().is_none() {
-            no_robot_ui(context, ui);
+            let panes = [Pane::middle(Part::Plots, "Robot", 300.0), model];
+            panes_ui(ui, "axis", &panes, |part, ui| match part {
+                Part::Model => self.model_ui(context, ui),
+                _ => no_robot_ui(context, ui),
+            });
             return;
         }
-        Panel::left("weights")
-            .frame(side)
-            .resizable(true)
-            .default_size(350.0)
-            .size_range(340.0..=480.0)
-            .show(ui, |ui| {
-                ScrollArea::vertical().show(ui, |ui| {
-                    self.design_ui(context, ui);
-                });
-            });
-        let bottom = Frame::central_panel(ui.style()).inner_margin(Margin::symmetric(10, 6));
+        let weights = Pane::left(Part::Weights, "Weights and gains", 350.0, 340.0..=480.0);
+        let plots = Pane::middle(Part::Plots, "Robot and prediction", 400.0);
+        panes_ui(ui, "tune", &[weights, plots, model], |part, ui| match part {
+            Part::Weights => self.design_ui(context, ui),
+            Part::Plots => self.plots_ui(context, ui),
+            Part::Model => self.model_ui(context, ui),
+        });
+    }
+
+    fn model_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
+        self.files.ui(context, ui);
+        self.parameters.ui(context, ui);
+    }
+
+    /// The live robot above what the design predicts.
+    fn plots_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
+        let frame = Frame::NONE.inner_margin(Margin::symmetric(0, 6));
         Panel::bottom("predicted")
-            .frame(bottom)
+            .frame(frame)
             .resizable(true)
             .default_size(224.0)
             .size_range(120.0..=420.0)
@@ -150,21 +152,27 @@ impl TuneTab {
             || context.link.is_open()
             || !context.history.time_s().is_empty();
         CentralPanel::default()
-            .frame(bottom)
+            .frame(Frame::NONE)
             .show(ui, |ui| if shown { self.plots.ui(context, ui) } else { not_connected_ui(context, ui) });
     }
 }
 
+/// The panes of the page.
+#[derive(Clone, Copy)]
+enum Part {
+    Weights,
+    Plots,
+    Model,
+}
+
 fn no_robot_ui(context: &ViewContext<'_>, ui: &mut Ui) {
-    CentralPanel::default().show(ui, |ui| {
-        ui.add_space(60.0);
-        ui.vertical_centered(|ui| {
-            ui.heading("This model is a single axis: there is nothing to balance");
-            hint_ui(ui, "Fit its friction on the friction tab, or load the model of a robot.");
-            if ui.button("Load the paper's robot").clicked() {
-                context.commands.send(Command::LoadPreset(0));
-            }
-        });
+    ui.add_space(60.0);
+    ui.vertical_centered(|ui| {
+        ui.heading("This model is a single axis: there is nothing to balance");
+        hint_ui(ui, "Fit its friction on the friction tab, or load the model of a robot.");
+        if ui.button("Load the paper's robot").clicked() {
+            context.commands.send(Command::LoadPreset(0));
+        }
     });
 }
 
