@@ -35,7 +35,7 @@ pub(crate) struct Arguments {
     #[arg(long)]
     paused: bool,
     /// Session file to open: model, weights, layout and sources as they were
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["model", "log"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["model", "log", "source"])]
     session: Option<PathBuf>,
     /// Keep what the window shows in this file, as JSON, for scripts that drive the window
     #[arg(long, value_name = "FILE")]

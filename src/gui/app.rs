@@ -21,7 +21,7 @@ use crate::commands::{Palette, Situation};
 use crate::context::ViewContext;
 use crate::design::Designer;
 use crate::dialog::{Answer, Dialog};
-use crate::document::{Base, Content, Opened, Store, Undo};
+use crate::document::{Base, Opened, Store, Undo};
 use crate::experiments::ExperimentsTab;
 use crate::friction::FrictionTab;
 use crate::history::{Channel, History};
@@ -69,6 +69,7 @@ pub struct App {
     asks_path: bool,
     leave_after_save: bool,
     leaving: bool,
+    was_hot: bool,
     tour: Option<Tour>,
     tour_is_due: bool,
     model_path: Option<PathBuf>,
@@ -108,7 +109,8 @@ impl App {
     ///
     /// # Errors
     /// The system gives no thread.
-    pub fn new(options: WindowOptions, ctx: &Context) -> std::io::Result<Self> {
+    pub fn new(mut options: WindowOptions, ctx: &Context) -> std::io::Result<Self> {
+        options.model_path = options.model_path.map(keep::absolute);
         crate::theme::apply(ctx);
         let waker: Waker = {
             let ctx = ctx.clone();
@@ -122,13 +124,7 @@ impl App {
         let base = Base { saved: session.clone(), path: options.model_path.clone() };
         let mut designer = Designer::default();
         designer.update(&session);
-        let content = Content {
-            session: session.clone(),
-            base: 0,
-            comparison: designer.comparison(),
-            experiment: experiments.settings().clone(),
-            layout: layout.node(),
-        };
+        let content = keep::content_of(&session, 0, &designer, experiments.settings(), layout.node());
         let mut app = Self {
             saved: session.clone(),
             base: 0,
@@ -140,6 +136,7 @@ impl App {
             asks_path: false,
             leave_after_save: false,
             leaving: false,
+            was_hot: false,
             tour: None,
             tour_is_due: options.tour,
             tune: TuneTab::new(&session, options.model_path.as_deref()),
@@ -209,6 +206,11 @@ impl App {
         for command in self.commands.take() {
             self.apply(command, ctx);
         }
+        let is_hot = self.link.is_hot();
+        if is_hot && !self.was_hot {
+            self.palette = None;
+        }
+        self.was_hot = is_hot;
         self.follow_design();
         self.watch_undo(ctx);
         self.keep_session(ctx);

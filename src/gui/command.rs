@@ -138,8 +138,11 @@ pub(crate) enum Command {
     LoadPreset(usize),
     TakePreset(usize),
     OpenSession(PathBuf),
-    /// Saves all of the window to a session file, whatever is there.
-    SaveSession(PathBuf),
+    /// Saves all of the window to a session file; replaces what is there if `replace`, or asks.
+    SaveSession {
+        path: PathBuf,
+        replace: bool,
+    },
     Undo,
     Redo,
     ShowSteps,

@@ -6,7 +6,8 @@ use egui::{Context, Theme};
 use flqr_core::device::{SessionOptions, Source as DeviceSource};
 use flqr_core::model_file::{Model, presets};
 
-use super::questions::Question;
+use super::keep::{self, absolute};
+use super::questions::{Question, Replacement};
 use super::{App, ModelJob, Saved};
 use crate::command::{Command, FilePurpose, Source, Target};
 use crate::command_line;
@@ -42,7 +43,11 @@ pub(super) fn chosen(purpose: FilePurpose, path: PathBuf) -> Command {
         FilePurpose::SaveRecording => Command::ChooseRecording(path),
         FilePurpose::SaveFigure(file) => Command::ChooseFigure(file, Ok(path)),
         FilePurpose::OpenSession => Command::OpenSession(path),
-        FilePurpose::SaveSession => Command::SaveSession(path),
+        // As with a model: the dialog has asked about the name as it was typed.
+        FilePurpose::SaveSession => {
+            let replace = keep::with_ending(path.clone()) == path;
+            Command::SaveSession { path, replace }
+        }
         // The dialog knows one name as it was typed; what is written may have another or several.
         FilePurpose::Refine(RefineFile::Log) => {
             Command::Refine(RefineCommand::Load { path, held_out: false })
@@ -80,7 +85,7 @@ impl App {
             Command::FocusPath => self.focus_path(),
             Command::Undo => self.go(false),
             Command::Redo => self.go(true),
-            Command::ShowSteps => self.question = Some(Question::Steps),
+            Command::ShowSteps => self.ask(Question::Steps),
             Command::StartTour => {
                 self.tour = Some(Tour::default());
                 self.commands.send(Command::SelectTab(Tab::Tune));
@@ -93,8 +98,8 @@ impl App {
                 Err(problem) => self.fail(problem),
             },
             Command::AskFile(purpose) => self.ask_file(purpose),
-            Command::OpenSession(path) => self.open_session(path),
-            Command::SaveSession(path) => self.save_session(path, ctx),
+            Command::OpenSession(path) => self.open_session(absolute(path)),
+            Command::SaveSession { path, replace } => self.save_session(absolute(path), replace, ctx),
             Command::Quit => ctx.send_viewport_cmd(egui::ViewportCommand::Close),
             Command::Stop => self.link.stop(),
             Command::SelectSource(source) => self.select_source(source),
@@ -148,10 +153,10 @@ impl App {
             Command::ShowDialog(purpose) => self.show_dialog(purpose),
             Command::LoadPreset(number) => self.ask_preset(number),
             Command::TakePreset(number) => self.load_preset(number),
-            Command::LoadModel(path) => self.load_model(path),
-            Command::SaveModel(path) => self.save_model(path, false),
-            Command::OverwriteModel(path) => self.save_model(path, true),
-            Command::LoadLog(path) => self.load_log(&path),
+            Command::LoadModel(path) => self.load_model(absolute(path)),
+            Command::SaveModel(path) => self.save_model(absolute(path), false),
+            Command::OverwriteModel(path) => self.save_model(absolute(path), true),
+            Command::LoadLog(path) => self.load_log(&absolute(path)),
             Command::CancelLoad => self.friction.cancel_load(),
             Command::StartFit => self.start_fit(),
             Command::CancelFit => self.friction.cancel_fit(),
@@ -350,14 +355,16 @@ impl App {
             return;
         }
         match Model::from_toml(text, name) {
-            Ok(model) => self.open_model(model, None),
+            Ok(model) => drop(self.open_model(model, None)),
             Err(error) => self.fail(error.to_string()),
         }
     }
 
-    fn open_model(&mut self, model: Model, path: Option<PathBuf>) {
+    /// Says whether the model was taken.
+    pub(super) fn open_model(&mut self, model: Model, path: Option<PathBuf>) -> bool {
         if self.link.is_hot() {
-            return self.fail("The robot may move: stop it before loading another model.");
+            self.fail("The robot may move: stop it before loading another model.");
+            return false;
         }
         // A robot is driven by the model that it was connected with, or not at all.
         self.link.close(&self.waker);
@@ -372,6 +379,7 @@ impl App {
             self.save_recent();
         }
         self.say_loaded();
+        true
     }
 
     pub(super) fn say_loaded(&mut self) {
@@ -402,6 +410,7 @@ impl App {
     /// Replaces the file that was loaded, and another one only if `replace`.
     fn save_model(&mut self, path: PathBuf, replace: bool) {
         if self.model_file_is_busy() {
+            self.leave_after_save = false;
             return;
         }
         let path = if path.extension().is_none() { path.with_extension("toml") } else { path };
@@ -420,7 +429,10 @@ impl App {
         };
         match Job::start("save-model", &self.waker, write) {
             Ok(job) => self.model_job = Some(ModelJob::Save(path, self.session.clone(), job)),
-            Err(error) => self.fail(format!("No thread to save the model: {error}.")),
+            Err(error) => {
+                self.leave_after_save = false;
+                self.fail(format!("No thread to save the model: {error}."));
+            }
         }
     }
 
@@ -429,7 +441,10 @@ impl App {
             None => {}
             Some(ModelJob::Load(path, mut job)) => match job.poll().1 {
                 Outcome::Running => self.model_job = Some(ModelJob::Load(path, job)),
-                Outcome::Done(Ok(model)) => self.open_model(model, Some(path)),
+                Outcome::Done(Ok(model)) if self.session != self.saved => {
+                    self.ask_replacement(Replacement::Model(Box::new(model), path));
+                }
+                Outcome::Done(Ok(model)) => drop(self.open_model(model, Some(path))),
                 Outcome::Done(Err(problem)) => {
                     self.tune.note_file_problem(&problem);
                     self.fail(problem);
@@ -440,14 +455,19 @@ impl App {
                 Outcome::Running => self.model_job = Some(ModelJob::Save(path, session, job)),
                 Outcome::Done(Ok(Saved::Written)) => self.note_saved(path, session),
                 Outcome::Done(Ok(Saved::AnotherIsThere)) => {
+                    self.leave_after_save = false;
                     self.say(format!("{} exists and was not replaced.", path.display()));
                     self.tune.ask_to_overwrite(path);
                 }
                 Outcome::Done(Err(problem)) => {
+                    self.leave_after_save = false;
                     self.tune.note_file_problem(&problem);
                     self.fail(problem);
                 }
-                Outcome::Broken => self.fail("Saving the model failed: this is a defect of flqr."),
+                Outcome::Broken => {
+                    self.leave_after_save = false;
+                    self.fail("Saving the model failed: this is a defect of flqr.");
+                }
             },
         }
     }
@@ -460,7 +480,13 @@ impl App {
         self.undo.set_base(self.base, Base { saved: self.saved.clone(), path: Some(path.clone()) });
         self.model_path = Some(path);
         self.save_recent();
-        self.leaving |= std::mem::take(&mut self.leave_after_save);
+        if std::mem::take(&mut self.leave_after_save) {
+            // What was edited while the file was written is in no file.
+            match self.session == self.saved {
+                true => self.leaving = true,
+                false => self.ask(Question::Leave),
+            }
+        }
     }
 
     fn load_log(&mut self, path: &Path) {

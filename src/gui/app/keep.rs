@@ -4,18 +4,36 @@ use std::path::{Path, PathBuf};
 
 use egui::{Context, Theme, ViewportCommand};
 
-use super::App;
-use super::questions::Question;
+use super::questions::{Question, Replacement};
+use super::{App, Saved};
 use crate::command::Command;
-use crate::document::{self, Base, Content, Document, Opened};
+use crate::design::Designer;
+use crate::document::{self, Base, Content, Document, Left, Opened};
+use crate::experiments::Settings;
 use crate::job::{Job, Outcome, Reporter, Waker};
+use crate::layout::Node;
 use crate::session::Session;
 use crate::write_file::write_file;
 
 /// A job on a session file: what was read of it, or that it was written.
 pub(super) enum SessionJob {
     Open(PathBuf, Job<(), Result<String, String>>),
-    Save(PathBuf, Job<(), Result<(), String>>),
+    Save(PathBuf, Job<(), Result<Saved, String>>),
+}
+
+/// A path that means the same wherever the program is started the next time.
+pub(super) fn absolute(path: PathBuf) -> PathBuf {
+    std::path::absolute(&path).unwrap_or(path)
+}
+
+/// The name of a session file: no other file is ever replaced by one.
+pub(super) fn with_ending(path: PathBuf) -> PathBuf {
+    if path.extension().is_some_and(|extension| extension == document::EXTENSION) {
+        return path;
+    }
+    let mut name = path.into_os_string();
+    name.push(format!(".{}", document::EXTENSION));
+    name.into()
 }
 
 /// Looks for what was kept, on a thread.
@@ -38,13 +56,8 @@ impl App {
             && now.comparison == self.designer.comparison()
             && now.experiment == *self.experiments.settings()
             && now.layout.is_alike(&layout);
-        let content = || Content {
-            session: self.session.clone(),
-            base: self.base,
-            comparison: self.designer.comparison(),
-            experiment: self.experiments.settings().clone(),
-            layout,
-        };
+        let content =
+            || content_of(&self.session, self.base, &self.designer, self.experiments.settings(), layout);
         self.undo.watch(content, is_same, settled);
     }
 
@@ -148,10 +161,22 @@ impl App {
         problems
     }
 
-    /// Takes over a session as a whole; nothing is connected by that.
-    pub(super) fn take_document(&mut self, name: &str, document: Document, ctx: &Context) {
+    /// Takes over how the window of before looked: where this one begins, so nothing that can be undone.
+    fn begin_as(&mut self, document: &Document, ctx: &Context) {
+        self.watch(true);
+        for problem in self.take_surroundings(document, ctx) {
+            self.fail(format!("The session of before: {problem}."));
+        }
+        let layout = self.layout.node();
+        let experiment = self.experiments.settings();
+        self.undo.rebase(content_of(&self.session, self.base, &self.designer, experiment, layout));
+    }
+
+    /// Takes over a session as a whole; nothing is connected by that. Says whether it was taken.
+    pub(super) fn take_document(&mut self, name: &str, document: &Document, ctx: &Context) -> bool {
         if self.link.is_hot() {
-            return self.fail("The robot may move: stop it before taking another session.");
+            self.fail("The robot may move: stop it before taking another session.");
+            return false;
         }
         self.undo.call(format!("open {name}"));
         if let Some(model) = document.model.clone() {
@@ -169,20 +194,21 @@ impl App {
         if let Some(log) = document.log.clone() {
             self.commands.send(Command::LoadLog(log));
         }
-        for problem in self.take_surroundings(&document, ctx) {
+        for problem in self.take_surroundings(document, ctx) {
             self.fail(format!("{name}: {problem}."));
         }
         if let Some(tab) = document.tab {
             self.commands.send(Command::SelectTab(tab));
         }
         self.commands.send(Command::Say(format!("The session of {name} is back.")));
+        true
     }
 
     /// Says what of a session file was not read, if anything.
     pub(super) fn say_unread(&mut self, path: &Path, problems: &[String]) {
         if !problems.is_empty() {
             self.fail(format!(
-                "Of the session file {} not all was read: {}. The file is kept there as it is.",
+                "Of the session file {} not all was read: {}. The file is kept as it is.",
                 path.display(),
                 problems.join("; ")
             ));
@@ -224,30 +250,37 @@ impl App {
             self.fail(problem);
         }
         self.store = opened.store;
-        let left = opened.left.map(|(path, text)| {
+        let last = opened.last.map(|(path, text)| {
             let (document, problems) = Document::from_json(&text);
-            (path, document, problems)
+            if !problems.is_empty() {
+                // This window replaces it when it is closed.
+                self.say_unread(&document::put_aside(&path).unwrap_or(path), &problems);
+            }
+            document
         });
-        if let Some((path, _, problems)) = &left {
-            self.say_unread(path, problems);
+        let Some(left) = opened.left else {
+            if let Some(document) = last {
+                self.begin_as(&document, ctx);
+            }
+            return;
+        };
+        let (document, problems) = Document::from_json(&left.text);
+        self.begin_as(&document, ctx);
+        let whole = problems.is_empty();
+        if document.may_have_unsaved_model(&problems) {
+            self.say_unread(&left.path, &problems);
+            self.question = Some(Question::Restore { left, document: Box::new(document), whole });
+        } else if whole {
+            self.take_over(left);
+        } else {
+            self.say_unread(&left.put_aside(), &problems);
         }
-        match left {
-            Some((path, document, problems)) if document.may_have_unsaved_model(&problems) => {
-                self.take_surroundings(&document, ctx);
-                let whole = problems.is_empty();
-                self.question = Some(Question::Restore { path, document: Box::new(document), whole });
-            }
-            Some((path, document, problems)) => {
-                self.take_surroundings(&document, ctx);
-                if problems.is_empty() {
-                    std::fs::remove_file(path).ok();
-                }
-            }
-            None => {
-                let Some(last) = opened.last else { return };
-                let (document, _) = Document::from_json(&last);
-                self.take_surroundings(&document, ctx);
-            }
+    }
+
+    /// What was left is in this window: its file goes when this window's own has it.
+    pub(super) fn take_over(&mut self, left: Left) {
+        if let Some(store) = &mut self.store {
+            store.take_over(left);
         }
     }
 
@@ -274,15 +307,19 @@ impl App {
         }
     }
 
-    pub(super) fn save_session(&mut self, path: PathBuf, ctx: &Context) {
+    /// Replaces what is there only if `replace`.
+    pub(super) fn save_session(&mut self, path: PathBuf, replace: bool, ctx: &Context) {
         if self.session_job.is_some() {
             return self
                 .fail("A session file is still being read or written: try again when that has ended.");
         }
-        let path = if path.extension().is_none() { path.with_extension(document::EXTENSION) } else { path };
+        let path = with_ending(path);
         let (file, text) = (path.clone(), self.document(ctx).to_json());
         let write = move |_: &Reporter<()>| {
-            write_file(&file, text.as_bytes()).map_err(|error| {
+            if !replace && file.symlink_metadata().is_ok() {
+                return Ok(Saved::AnotherIsThere);
+            }
+            write_file(&file, text.as_bytes()).map(|()| Saved::Written).map_err(|error| {
                 format!("{} could not be saved: {error}; nothing was changed", file.display())
             })
         };
@@ -293,6 +330,10 @@ impl App {
     }
 
     fn drain_session_job(&mut self, ctx: &Context) {
+        // What the window begins with must not come over what was asked for.
+        if self.opening.is_some() {
+            return;
+        }
         match self.session_job.take() {
             None => {}
             Some(SessionJob::Open(path, mut job)) => match job.poll().1 {
@@ -300,9 +341,11 @@ impl App {
                 Outcome::Done(Ok(text)) => {
                     let (document, problems) = Document::from_json(&text);
                     if document != Document::default() {
-                        self.take_document(&path.display().to_string(), document, ctx);
-                        self.recent.note_session(&path);
-                        self.save_recent();
+                        if document.model.is_some() && self.session != self.saved {
+                            self.ask_replacement(Replacement::Session(Box::new(document), path.clone()));
+                        } else {
+                            self.take_session(&path, &document, ctx);
+                        }
                     }
                     self.say_unread(&path, &problems);
                 }
@@ -311,7 +354,11 @@ impl App {
             },
             Some(SessionJob::Save(path, mut job)) => match job.poll().1 {
                 Outcome::Running => self.session_job = Some(SessionJob::Save(path, job)),
-                Outcome::Done(Ok(())) => {
+                Outcome::Done(Ok(Saved::AnotherIsThere)) => {
+                    self.say(format!("{} exists and was not replaced.", path.display()));
+                    self.ask(Question::Overwrite { path });
+                }
+                Outcome::Done(Ok(Saved::Written)) => {
                     self.say(format!("The session is saved to {}.", path.display()));
                     self.recent.note_session(&path);
                     self.save_recent();
@@ -322,6 +369,16 @@ impl App {
         }
     }
 
+    /// Takes over a session that was read from `path`. Says whether it was taken.
+    pub(super) fn take_session(&mut self, path: &Path, document: &Document, ctx: &Context) -> bool {
+        let taken = self.take_document(&path.display().to_string(), document, ctx);
+        if taken {
+            self.recent.note_session(path);
+            self.save_recent();
+        }
+        taken
+    }
+
     /// Asks before changes of the model are lost with the window.
     pub(super) fn answer_close(&mut self, ctx: &Context) {
         if self.leaving {
@@ -330,7 +387,7 @@ impl App {
         }
         if ctx.input(|input| input.viewport().close_requested()) && self.session != self.saved {
             ctx.send_viewport_cmd(ViewportCommand::CancelClose);
-            self.question = Some(Question::Leave);
+            self.ask(Question::Leave);
         }
     }
 
@@ -340,5 +397,21 @@ impl App {
         if let Some(store) = &mut self.store {
             store.close(&text);
         }
+    }
+}
+
+pub(super) fn content_of(
+    session: &Session,
+    base: usize,
+    designer: &Designer,
+    experiment: &Settings,
+    layout: Node,
+) -> Content {
+    Content {
+        session: session.clone(),
+        base,
+        comparison: designer.comparison(),
+        experiment: experiment.clone(),
+        layout,
     }
 }

@@ -2,13 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use egui::{Context, Grid, Modal, RichText, ScrollArea, TextEdit, Ui};
+use egui::{Context, Grid, Modal, RichText, ScrollArea, TextEdit, Ui, vec2};
 use flqr_core::model_file::{Change, Model, presets};
 
 use super::{App, apply};
 use crate::command::{Command, FilePurpose};
-use crate::document::{Document, words};
+use crate::document::{Document, Left, words};
 use crate::recent::Recent;
+use crate::robot::{STOP_HEIGHT, stop_ui};
 use crate::widgets::{hint_ui, mono, warning_ui};
 
 /// Rows of a table of changes that are shown at once.
@@ -21,11 +22,21 @@ pub(super) enum Question {
     /// A preset is to replace the model.
     Preset { number: usize, name: &'static str, changes: Vec<Change> },
     /// A window was not closed.
-    Restore { path: PathBuf, document: Box<Document>, whole: bool },
+    Restore { left: Left, document: Box<Document>, whole: bool },
+    /// What was read is to replace a model with changes.
+    Replace { by: Replacement, changes: Vec<Change> },
+    /// A session is to be saved where a file is.
+    Overwrite { path: PathBuf },
     /// A path is wanted; why there is no dialog for it.
     Path { purpose: FilePurpose, text: String, reason: Option<String>, has_focus: bool },
     /// What can be undone.
     Steps,
+}
+
+/// What is to replace the model, and its file.
+pub(super) enum Replacement {
+    Model(Box<Model>, PathBuf),
+    Session(Box<Document>, PathBuf),
 }
 
 /// What an answer asks for.
@@ -37,6 +48,7 @@ enum Answer {
     Discard,
     Restore,
     StartAfresh,
+    Replace,
     Undo(usize),
     Redo(usize),
 }
@@ -48,6 +60,8 @@ impl Question {
             Self::Leave => "leave",
             Self::Preset { .. } => "preset",
             Self::Restore { .. } => "restore",
+            Self::Replace { .. } => "replace",
+            Self::Overwrite { .. } => "overwrite",
             Self::Path { .. } => "path",
             Self::Steps => "steps",
         }
@@ -55,13 +69,30 @@ impl Question {
 }
 
 impl App {
+    /// Asks, unless what was left of a crash is still to be answered.
+    pub(super) fn ask(&mut self, question: Question) {
+        if !matches!(self.question, Some(Question::Restore { .. })) {
+            self.question = Some(question);
+        }
+    }
+
+    /// Asks before a file replaces a model that has changes.
+    pub(super) fn ask_replacement(&mut self, by: Replacement) {
+        let model = match &by {
+            Replacement::Model(model, _) => Some(&**model),
+            Replacement::Session(document, _) => document.model.as_ref(),
+        };
+        let changes = model.map(|model| self.session.model().changes_to(model)).unwrap_or_default();
+        self.ask(Question::Replace { by, changes });
+    }
+
     /// Asks before a preset replaces the model, with what changes.
     pub(super) fn ask_preset(&mut self, number: usize) {
         let Some((name, text)) = presets::ALL.get(number) else { return };
         match Model::from_toml(text, name) {
             Ok(model) => {
                 let changes = self.session.model().changes_to(&model);
-                self.question = Some(Question::Preset { number, name, changes });
+                self.ask(Question::Preset { number, name, changes });
             }
             Err(error) => self.fail(error.to_string()),
         }
@@ -74,16 +105,23 @@ impl App {
             _ => None,
         };
         let text = text.map(|path| path.display().to_string()).unwrap_or_default();
-        self.question = Some(Question::Path { purpose, text, reason, has_focus: false });
+        self.ask(Question::Path { purpose, text, reason, has_focus: false });
     }
 
     /// Draws the open question.
     pub(super) fn question_ui(&mut self, ctx: &Context) {
         let Some(mut question) = self.question.take() else { return };
+        let mut stop = false;
         let modal = Modal::new(egui::Id::unique("question")).show(ctx, |ui| {
             ui.set_width(560.0_f32.min(ctx.content_rect().width() - 40.0).max(0.0));
+            // The one of the strip cannot be reached behind this.
+            let size = vec2(ui.available_width(), STOP_HEIGHT);
+            stop = self.link.is_hot() && stop_ui(ui, size).clicked();
             self.ask_ui(&mut question, ui)
         });
+        if stop {
+            self.link.stop();
+        }
         let answer = match modal.inner {
             Answer::Open if modal.should_close() && !matches!(question, Question::Restore { .. }) => {
                 Answer::Close
@@ -106,21 +144,36 @@ impl App {
                 self.leaving = true;
             }
             Answer::Restore => {
-                if let Question::Restore { path, mut document, whole } = question {
+                if let Question::Restore { left, mut document, whole } = question {
                     if !whole && document.saved_model.is_none() {
                         // What its file has is not known, so it counts as changed.
                         document.saved_model = Some(self.saved.model());
                     }
-                    self.take_document(&document_name(&document), *document, ctx);
-                    if whole {
-                        // The running window keeps it from now on.
-                        std::fs::remove_file(path).ok();
+                    if !self.take_document(&document_name(&document), &document, ctx) {
+                        self.question = Some(Question::Restore { left, document, whole });
+                    } else if whole {
+                        self.take_over(left);
+                    } else {
+                        self.say(format!("What was kept stays in {}.", left.put_aside().display()));
                     }
                 }
             }
             Answer::StartAfresh => {
-                if let Question::Restore { path, .. } = question {
-                    self.say(format!("The session of before stays in {}.", path.display()));
+                if let Question::Restore { left, .. } = question {
+                    self.say(format!("The session of before stays in {}.", left.put_aside().display()));
+                }
+            }
+            Answer::Replace => {
+                if let Question::Replace { by, changes } = question {
+                    let taken = match &by {
+                        Replacement::Model(model, path) => {
+                            self.open_model((**model).clone(), Some(path.clone()))
+                        }
+                        Replacement::Session(document, path) => self.take_session(path, document, ctx),
+                    };
+                    if !taken {
+                        self.question = Some(Question::Replace { by, changes });
+                    }
                 }
             }
             Answer::Undo(count) => (0..count).for_each(|_| self.go(false)),
@@ -137,6 +190,8 @@ impl App {
             Question::Path { purpose, text, reason, has_focus } => {
                 path_ui(*purpose, text, reason.as_deref(), has_focus, &self.recent, ui)
             }
+            Question::Replace { by, changes } => self.replace_ui(by, changes, ui),
+            Question::Overwrite { path } => overwrite_ui(path, ui),
             Question::Steps => self.steps_ui(ui),
         }
     }
@@ -151,6 +206,24 @@ impl App {
                 ("Save and close", "Save the model, then close the window", Answer::SaveAndLeave),
                 ("Discard and close", "Close the window; the changes are lost", Answer::Discard),
                 ("Cancel", "Go on", Answer::Close),
+            ],
+        )
+    }
+
+    fn replace_ui(&self, by: &Replacement, changes: &[Change], ui: &mut Ui) -> Answer {
+        let (Replacement::Model(_, path) | Replacement::Session(_, path)) = by;
+        ui.heading(format!("Open {}?", path.display()));
+        ui.label(format!(
+            "“{}” has changes that are in no file. {} values change; undo brings those of now back.",
+            self.session.name,
+            changes.len()
+        ));
+        changes_ui(changes, ui);
+        answers_ui(
+            ui,
+            [
+                ("Replace the model", "Open the file in place of the model", Answer::Replace),
+                ("Keep the model", "Leave the model as it is", Answer::Close),
             ],
         )
     }
@@ -214,6 +287,19 @@ fn preset_ui(number: usize, name: &str, changes: &[Change], ui: &mut Ui) -> Answ
         [
             ("Load the preset", "Replace the model", Answer::Send(Command::TakePreset(number))),
             ("Keep the model", "Leave the model as it is", Answer::Close),
+        ],
+    )
+}
+
+fn overwrite_ui(path: &Path, ui: &mut Ui) -> Answer {
+    ui.heading("Replace the file?");
+    ui.label(format!("There is already a file {}.", path.display()));
+    let replace = Command::SaveSession { path: path.to_owned(), replace: true };
+    answers_ui(
+        ui,
+        [
+            ("Replace it", "Save the session in its place", Answer::Send(replace)),
+            ("Cancel", "Leave the file as it is", Answer::Close),
         ],
     )
 }
@@ -284,7 +370,7 @@ fn path_ui(
     }
     let exists = saves(purpose) && !text.trim().is_empty() && Path::new(text.trim()).exists();
     if exists {
-        warning_ui(ui, "There is such a file: it is replaced only after a question, or by a session.");
+        warning_ui(ui, "There is such a file: it is replaced only after a question.");
     }
     let answer = answers_ui(
         ui,
@@ -304,6 +390,9 @@ fn taken(purpose: FilePurpose, text: &str) -> Answer {
     match text.trim() {
         "" => Answer::Open,
         path if purpose == FilePurpose::SaveModel => Answer::Send(Command::SaveModel(path.into())),
+        path if purpose == FilePurpose::SaveSession => {
+            Answer::Send(Command::SaveSession { path: path.into(), replace: false })
+        }
         path => Answer::Send(apply::chosen(purpose, path.into())),
     }
 }

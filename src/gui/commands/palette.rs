@@ -1,9 +1,10 @@
 //! The command palette: a filter over all commands.
 
-use egui::{Button, Context, Key, Modal, Modifiers, RichText, ScrollArea, TextEdit, Ui};
+use egui::{Button, Context, Key, Modal, Modifiers, RichText, ScrollArea, TextEdit, Ui, vec2};
 
 use super::{ALL, Situation};
-use crate::command::Commands;
+use crate::command::{Command, Commands};
+use crate::robot::{STOP_HEIGHT, stop_ui};
 use crate::widgets::hint_ui;
 
 /// The open palette.
@@ -20,6 +21,10 @@ impl Palette {
     pub(crate) fn ui(&mut self, situation: &Situation<'_>, commands: &Commands, ctx: &Context) -> bool {
         let modal = Modal::new(egui::Id::unique("palette")).show(ctx, |ui| {
             ui.set_width(520.0_f32.min(ctx.content_rect().width() - 40.0).max(0.0));
+            // The one of the strip cannot be reached behind this.
+            if situation.is_hot && stop_ui(ui, vec2(ui.available_width(), STOP_HEIGHT)).clicked() {
+                commands.send(Command::Stop);
+            }
             self.content_ui(situation, commands, ui)
         });
         modal.inner && !modal.should_close()

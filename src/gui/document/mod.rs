@@ -18,7 +18,7 @@ use crate::layout::Node;
 use crate::tab::Tab;
 use members::members;
 pub use store::default_folder;
-pub(crate) use store::{Opened, Store, open};
+pub(crate) use store::{Left, Opened, Store, open, put_aside};
 pub(crate) use undo::{Base, Content, Undo, words};
 
 const FORMAT: &str = "flqr-session";

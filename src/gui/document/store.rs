@@ -33,17 +33,36 @@ pub fn default_folder() -> Option<PathBuf> {
 pub(crate) struct Opened {
     /// Its slot; none where all are taken or the folder cannot be used.
     pub(crate) store: Option<Store>,
-    /// What a window left behind that was not closed: where it is now, and its text.
-    pub(crate) left: Option<(PathBuf, String)>,
-    /// The session of the window that was closed last.
-    pub(crate) last: Option<String>,
+    /// What a window left behind that was not closed.
+    pub(crate) left: Option<Left>,
+    /// The session of the window that was closed last, and its text.
+    pub(crate) last: Option<(PathBuf, String)>,
     /// Why nothing will be kept.
     pub(crate) problem: Option<String>,
 }
 
+/// A session in a slot that nobody held. It stays there, found again at each start, until somebody has said what
+/// becomes of it.
+#[derive(Debug)]
+pub(crate) struct Left {
+    pub(crate) path: PathBuf,
+    pub(crate) text: String,
+    /// Held, so that no other window offers it too.
+    _lock: File,
+}
+
+impl Left {
+    /// Takes it out of its slot, so that it is offered and overwritten by nobody; says where it is then.
+    pub(crate) fn put_aside(self) -> PathBuf {
+        put_aside(&self.path).unwrap_or(self.path)
+    }
+}
+
 /// Takes a slot and looks for what was left. May wait for a disk.
 pub(crate) fn open(folder: &Path) -> Opened {
-    let mut opened = Opened { store: None, left: None, last: read(&last_file(folder)), problem: None };
+    let last = last_file(folder);
+    let last = read(&last).map(|text| (last, text));
+    let mut opened = Opened { store: None, left: None, last, problem: None };
     let problem = |error: &std::io::Error| {
         Some(format!("The session will not be kept: {} cannot be used ({error}).", folder.display()))
     };
@@ -66,25 +85,32 @@ pub(crate) fn open(folder: &Path) -> Opened {
             // A file system without locks: one window at a time is kept.
             Err(TryLockError::Error(_)) => {}
         }
-        if opened.left.is_none() && path.exists() {
-            opened.left = put_aside(folder, &path);
+        if !path.exists() {
+            if opened.store.is_none() {
+                opened.store = Some(Store::new(folder.to_owned(), path, lock));
+            }
+        } else if opened.left.is_none() {
+            opened.left = read(&path).map(|text| Left { path, text, _lock: lock });
         }
-        if opened.store.is_none() && !path.exists() {
-            opened.store = Some(Store::new(folder.to_owned(), path, lock));
-        }
+    }
+    if opened.store.is_none() {
+        opened.problem = Some(format!(
+            "The session will not be kept: all {SLOTS} places in {} are taken. Close other windows, or move the running-*.{EXTENSION} files there elsewhere.",
+            folder.display()
+        ));
     }
     opened
 }
 
-/// Takes what was left out of its slot, so that it is overwritten by nobody.
-fn put_aside(folder: &Path, path: &Path) -> Option<(PathBuf, String)> {
-    let text = read(path)?;
+/// Gives a file a name under which nobody overwrites it.
+pub(crate) fn put_aside(path: &Path) -> Option<PathBuf> {
+    let folder = path.parent()?;
     let aside = (0..)
         .map(|number| folder.join(format!("left-{number}.{EXTENSION}")))
         .find(|aside| !aside.exists())
         .expect("there are more numbers than files");
     std::fs::rename(path, &aside).ok()?;
-    Some((aside, text))
+    Some(aside)
 }
 
 fn last_file(folder: &Path) -> PathBuf {
@@ -109,11 +135,33 @@ pub(crate) struct Store {
     looked: Option<Instant>,
     job: Option<Job<(), Result<(), String>>>,
     failed: bool,
+    /// What the session has taken over, removed once that is on the disk.
+    taken: Vec<Left>,
+    /// As above, and in what is being written.
+    in_job: Vec<Left>,
 }
 
 impl Store {
     fn new(folder: PathBuf, path: PathBuf, lock: File) -> Self {
-        Self { folder, path, _lock: lock, written: String::new(), looked: None, job: None, failed: false }
+        Self {
+            folder,
+            path,
+            _lock: lock,
+            written: String::new(),
+            looked: None,
+            job: None,
+            failed: false,
+            taken: Vec::new(),
+            in_job: Vec::new(),
+        }
+    }
+
+    /// The session of now contains what was left: its file goes as soon as the session has been written.
+    pub(crate) fn take_over(&mut self, left: Left) {
+        self.taken.push(left);
+        // Written at the next look, whatever is there already.
+        self.written.clear();
+        self.looked = None;
     }
 
     /// How long until the session is to be looked at; none for now.
@@ -139,6 +187,7 @@ impl Store {
         if let Ok(job) = Job::start("keep-session", waker, write) {
             self.job = Some(job);
             self.written = text;
+            self.in_job.append(&mut self.taken);
         }
     }
 
@@ -155,9 +204,13 @@ impl Store {
             Err(problem) => {
                 // Tried again at the next look.
                 self.written.clear();
+                self.taken.append(&mut self.in_job);
                 (!failed_before).then_some(Err(problem))
             }
-            Ok(()) => failed_before.then(|| Ok("The session is kept again.".to_owned())),
+            Ok(()) => {
+                remove(&mut self.in_job);
+                failed_before.then(|| Ok("The session is kept again.".to_owned()))
+            }
         }
     }
 
@@ -170,7 +223,15 @@ impl Store {
         self.job = None;
         if write_file(&last_file(&self.folder), text.as_bytes()).is_ok() {
             std::fs::remove_file(&self.path).ok();
+            remove(&mut self.taken);
+            remove(&mut self.in_job);
         }
+    }
+}
+
+fn remove(all: &mut Vec<Left>) {
+    for left in all.drain(..) {
+        std::fs::remove_file(&left.path).ok();
     }
 }
 
@@ -216,22 +277,57 @@ mod tests {
         store.close("two");
         drop(opened);
         let again = open(&folder.0);
-        assert_eq!((again.left, again.last.as_deref()), (None, Some("two")));
+        assert!(again.left.is_none());
+        assert_eq!(again.last.map(|(_, text)| text).as_deref(), Some("two"));
     }
 
     #[test]
-    fn what_a_window_left_behind_is_found_once_and_put_aside() {
+    fn what_a_window_left_behind_is_offered_until_it_is_answered() {
         let folder = Folder::new("left");
         let mut opened = open(&folder.0);
         keep(opened.store.as_mut().unwrap(), "unsaved");
         drop(opened);
-        let found = open(&folder.0);
-        let (path, text) = found.left.clone().unwrap();
-        assert_eq!((text.as_str(), std::fs::read_to_string(&path).unwrap().as_str()), ("unsaved", "unsaved"));
-        assert!(found.store.is_some());
-        drop(found);
-        assert!(open(&folder.0).left.is_none(), "it is offered once, and stays where it was put");
+        for _ in 0..2 {
+            let mut found = open(&folder.0);
+            assert_eq!(found.left.as_ref().unwrap().text, "unsaved");
+            assert!(open(&folder.0).left.is_none(), "not by two windows at a time");
+            found.store.as_mut().unwrap().close("nothing");
+        }
+        let path = open(&folder.0).left.unwrap().put_aside();
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "unsaved");
+        assert!(open(&folder.0).left.is_none(), "it was answered, and stays where it was put");
         assert!(path.exists());
+    }
+
+    #[test]
+    fn what_was_taken_over_is_removed_only_when_it_is_on_the_disk_again() {
+        let folder = Folder::new("taken");
+        let mut opened = open(&folder.0);
+        keep(opened.store.as_mut().unwrap(), "unsaved");
+        drop(opened);
+        let mut found = open(&folder.0);
+        let left = found.left.take().unwrap();
+        let path = left.path.clone();
+        let store = found.store.as_mut().unwrap();
+        keep(store, "unsaved and more");
+        std::fs::remove_file(&store.path).unwrap();
+        std::fs::create_dir_all(store.path.join("inside")).unwrap();
+        store.take_over(left);
+        assert!(keep(store, "unsaved and more").unwrap().is_err());
+        assert!(path.exists(), "the only copy");
+        std::fs::remove_dir_all(&store.path).unwrap();
+        assert!(keep(store, "unsaved and more").unwrap().is_ok());
+        assert!(!path.exists());
+    }
+
+    #[test]
+    fn a_window_without_a_slot_says_so() {
+        let folder = Folder::new("full");
+        let mut windows: Vec<_> = (0..SLOTS).map(|_| open(&folder.0)).collect();
+        assert!(windows.iter().all(|window| window.problem.is_none()));
+        assert!(open(&folder.0).problem.unwrap().contains("are taken"));
+        windows.pop();
+        assert!(open(&folder.0).problem.is_none());
     }
 
     #[test]
@@ -244,7 +340,7 @@ mod tests {
         let third = open(&folder.0);
         assert!(third.left.is_none(), "both are running: {:?}", third.left);
         drop(second);
-        assert_eq!(open(&folder.0).left.map(|(_, text)| text).as_deref(), Some("second"));
+        assert_eq!(open(&folder.0).left.map(|left| left.text).as_deref(), Some("second"));
     }
 
     #[test]

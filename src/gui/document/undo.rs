@@ -114,6 +114,12 @@ impl Undo {
         }
     }
 
+    /// Takes what there is now as the start, without a step.
+    pub(crate) fn rebase(&mut self, now: Content) {
+        self.now = now;
+        self.name = None;
+    }
+
     /// What there was at the last step.
     pub(crate) fn now(&self) -> &Content {
         &self.now

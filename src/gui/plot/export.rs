@@ -137,11 +137,11 @@ impl Export {
         match answer.and_then(|answer| answer.0) {
             Some((kind, Ok(path))) => {
                 // The dialog has asked before replacing a file, though not about an ending added here.
-                let replace = path.extension().is_some();
+                let full = with_ending(path.clone(), kind);
+                let replace = full == path;
                 (self.open, self.kind) = (true, kind);
-                let path = with_ending(path, kind);
-                self.path = path.display().to_string();
-                asked.save = Some((path, replace));
+                self.path = full.display().to_string();
+                asked.save = Some((full, replace));
             }
             Some((_, Err(problem))) => self.problem = Some(problem),
             None => {}

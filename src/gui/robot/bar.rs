@@ -14,7 +14,7 @@ use crate::widgets::plain;
 /// Fill of the button that stops the robot, in both themes.
 const STOP_FILL: Color32 = Color32::from_rgb(196, 32, 28);
 
-const STOP_HEIGHT: f32 = 30.0;
+pub(crate) const STOP_HEIGHT: f32 = 30.0;
 
 /// The strip; says whether STOP was pressed.
 pub(crate) fn bar_ui(link: &Link, (source, tab): (Source, Tab), commands: &Commands, ui: &mut Ui) -> bool {
@@ -36,7 +36,7 @@ pub(crate) fn bar_ui(link: &Link, (source, tab): (Source, Tab), commands: &Comma
 }
 
 /// The button that takes torque and power off.
-pub(super) fn stop_ui(ui: &mut Ui, size: egui::Vec2) -> Response {
+pub(crate) fn stop_ui(ui: &mut Ui, size: egui::Vec2) -> Response {
     let text = RichText::new("STOP   Esc, Space").strong().color(Color32::WHITE);
     let button = Button::new(text).fill(STOP_FILL).min_size(size);
     ui.add(button).accessible_name("STOP").on_hover_text("No torque, motors off, at once (Esc or Space)")

@@ -29,7 +29,7 @@ use crate::panes::{Pane, panes_ui};
 use crate::recent::Recent;
 use crate::theme::palette;
 use crate::widgets::{hint_ui, section_ui};
-pub(crate) use bar::bar_ui;
+pub(crate) use bar::{STOP_HEIGHT, bar_ui, stop_ui};
 use events::EventLog;
 pub(crate) use feed::System;
 pub use feed::{Devices, RobotFeed};

@@ -436,6 +436,31 @@ fn stop_is_in_reach_on_every_tab_and_its_reason_is_shown() {
     assert_eq!(script.drive_orders(), [DriveOrder::Release]);
 }
 
+#[test]
+fn stop_is_in_reach_of_the_mouse_behind_the_palette_and_a_question() {
+    let script = Script::default();
+    let mut window = drive_window(&script);
+    window.key_press_modifiers(Modifiers::COMMAND, Key::K);
+    window.run_steps(3);
+    arm_by_orders(&mut window, &script);
+    window.run_steps(2);
+    assert!(window.query_by_label("command").is_none(), "the palette closes by itself");
+    for steps in [false, true] {
+        window.key_press_modifiers(Modifiers::COMMAND, Key::K);
+        window.run_steps(3);
+        if steps {
+            window.event(Input::Text("steps".to_owned()));
+            window.run_steps(2);
+            window.key_press(Key::Enter);
+            window.run_steps(4);
+            assert_eq!(state(&window)["question"], "steps");
+        }
+        window.get_all_by_label("STOP").last().unwrap().click();
+        window.run_steps(3);
+        assert_eq!(script.drive_orders(), [DriveOrder::Stop], "a question: {steps}");
+    }
+}
+
 /// Driving, whatever the tab.
 fn arm_by_orders(window: &mut Window, script: &Script) {
     tell(window, script, at_stage(1.0, Stage::Driving, GOOD));

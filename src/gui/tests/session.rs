@@ -176,6 +176,10 @@ fn starting_afresh_leaves_the_kept_session_in_its_file() {
     enter(&mut window, "pitch weight", "5");
     command(&mut window, "open a session");
     enter(&mut window, "path of the file", kept.to_str().unwrap());
+    until(&mut window, "the question", |s| s["question"] == "replace");
+    assert_eq!(pitch_weight(&window), 5.0);
+    window.run_steps(2);
+    click(&mut window, "Replace the model");
     until(&mut window, "opening", |s| s["q_diagonal"][2] == 322.0);
 }
 
@@ -192,6 +196,7 @@ fn a_closed_window_leaves_its_layout_and_asks_nothing() {
     let mut window = open(folder.options(), SIZE);
     until(&mut window, "the layout", |s| s["shown"] == json!(["tune", "robot"]));
     assert!(state(&window)["question"].is_null());
+    assert_eq!(state(&window)["undo"], json!([]), "a start is nothing to undo");
 }
 
 #[test]
@@ -220,13 +225,15 @@ fn a_broken_session_file_never_stops_the_start() {
         let expected = |s: &Value| s["message"].as_str().is_some_and(|message| message.contains(said));
         let found = until(&mut window, said, expected);
         let kept = folder.0.join(format!("left-{number}.flqr-session"));
-        assert!(found["message"].as_str().unwrap().contains(kept.to_str().unwrap()), "{found:#}");
-        assert_eq!(std::fs::read_to_string(&kept).unwrap(), text, "the file is as it was");
+        let named = if asks { folder.running() } else { kept.clone() };
+        assert!(found["message"].as_str().unwrap().contains(named.to_str().unwrap()), "{found:#}");
+        assert_eq!(std::fs::read_to_string(&named).unwrap(), text, "the file is as it was");
         assert_eq!(found["question"] == "restore", asks, "{said}: {found:#}");
         if asks {
             window.run_steps(2);
             click(&mut window, "Restore it");
             assert_eq!(pitch_weight(&window), 323.0, "{said}");
+            assert_eq!(std::fs::read_to_string(&kept).unwrap(), text, "put aside as it was");
         }
         // The slot is free for the next one.
         window.state_mut().as_mut().unwrap().end();
