@@ -21,7 +21,7 @@ use crate::commands::{Palette, Situation};
 use crate::context::ViewContext;
 use crate::design::Designer;
 use crate::dialog::{Answer, Dialog};
-use crate::document::{Base, Opened, Store, Undo};
+use crate::document::{Base, Content, Opened, Store, Undo};
 use crate::experiments::ExperimentsTab;
 use crate::friction::FrictionTab;
 use crate::history::{Channel, History};
@@ -32,7 +32,7 @@ use crate::messages::{Messages, Severity};
 use crate::recent::{Recent, RecentFile};
 use crate::refine::{RefineCommand, RefineTab};
 use crate::robot::{Link, RobotTab, sentence};
-use crate::runs::RunsTab;
+use crate::runs::{Ledger, RunsTab};
 use crate::session::Session;
 use crate::state_out::StateOut;
 use crate::tab::Tab;
@@ -61,10 +61,16 @@ pub struct App {
     /// The number of the loaded model in the undo.
     base: usize,
     undo: Undo,
+    /// Which of the ledgers is shown; its own place is empty.
+    ledger: usize,
+    /// All that were opened, for undo.
+    ledgers: Vec<Ledger>,
     opening: Option<Job<(), Opened>>,
     store: Option<Store>,
     session_job: Option<keep::SessionJob>,
     question: Option<questions::Question>,
+    /// The answer that has the keyboard's focus.
+    question_focus: Option<&'static str>,
     /// The file dialog was asked for where no path field is in view.
     asks_path: bool,
     leave_after_save: bool,
@@ -124,15 +130,25 @@ impl App {
         let base = Base { saved: session.clone(), path: options.model_path.clone() };
         let mut designer = Designer::default();
         designer.update(&session);
-        let content = keep::content_of(&session, 0, &designer, experiments.settings(), layout.node());
+        let content = Content {
+            session: session.clone(),
+            base: 0,
+            ledger: 0,
+            comparison: designer.comparison(),
+            experiment: experiments.settings().clone(),
+            layout: layout.node(),
+        };
         let mut app = Self {
             saved: session.clone(),
             base: 0,
             undo: Undo::new(content, base),
+            ledger: 0,
+            ledgers: vec![Ledger::default()],
             opening: keep::open_store(options.state_folder, &waker)?,
             store: None,
             session_job: None,
             question: None,
+            question_focus: None,
             asks_path: false,
             leave_after_save: false,
             leaving: false,
@@ -404,12 +420,13 @@ impl App {
             }
         };
         self.dialog = None;
+        let asks_path = std::mem::take(&mut self.asks_path);
         match answer {
             Answer::Chosen(path) => self.commands.send(apply::chosen(purpose, path)),
             Answer::Cancelled => {}
             Answer::Unavailable(problem) => {
                 self.fail(problem.clone());
-                if std::mem::take(&mut self.asks_path) {
+                if asks_path {
                     self.ask_path(purpose, Some(problem.clone()));
                 }
                 self.tune.note_dialog_problem(purpose, &problem);
@@ -513,6 +530,7 @@ impl App {
             "tab": self.tab.key(),
             "shown": self.layout.shown().iter().map(|tab| tab.key()).collect::<Vec<_>>(),
             "question": self.question.as_ref().map(questions::Question::key),
+            "question_focus": self.question_focus,
             "undo": self.undo.undoable().collect::<Vec<_>>(),
             "redo": self.undo.redoable().collect::<Vec<_>>(),
             "tour": self.tour.map(Tour::number),

@@ -441,7 +441,7 @@ impl App {
             None => {}
             Some(ModelJob::Load(path, mut job)) => match job.poll().1 {
                 Outcome::Running => self.model_job = Some(ModelJob::Load(path, job)),
-                Outcome::Done(Ok(model)) if self.session != self.saved => {
+                Outcome::Done(Ok(model)) if self.session != self.saved && !self.link.is_hot() => {
                     self.ask_replacement(Replacement::Model(Box::new(model), path));
                 }
                 Outcome::Done(Ok(model)) => drop(self.open_model(model, Some(path))),
@@ -560,18 +560,20 @@ impl App {
         let files = ctx.input(|input| {
             input.raw.dropped_files.iter().map(|file| file.path().to_owned()).collect::<Vec<_>>()
         });
-        let held_out = false;
-        if self.tab == Tab::Refine && files.iter().all(|path| path.extension().is_none_or(|e| e != "toml")) {
+        let ends_with = |path: &Path, ending: &str| path.extension().is_some_and(|found| found == ending);
+        let is_log =
+            |path: &PathBuf| !ends_with(path, "toml") && !ends_with(path, crate::document::EXTENSION);
+        if self.tab == Tab::Refine && files.iter().all(is_log) {
             for path in files {
-                self.commands.send(Command::Refine(RefineCommand::Load { path, held_out }));
+                let path = absolute(path);
+                self.commands.send(Command::Refine(RefineCommand::Load { path, held_out: false }));
             }
             return;
         }
         let Some(path) = files.into_iter().next() else { return };
-        let ends_with = |ending: &str| path.extension().is_some_and(|extension| extension == ending);
-        if ends_with(crate::document::EXTENSION) {
+        if ends_with(&path, crate::document::EXTENSION) {
             self.commands.send(Command::OpenSession(path));
-        } else if ends_with("toml") {
+        } else if ends_with(&path, "toml") {
             self.commands.send(Command::LoadModel(path));
         } else {
             self.commands.send(Command::SelectTab(Tab::Friction));

@@ -7,11 +7,8 @@ use egui::{Context, Theme, ViewportCommand};
 use super::questions::{Question, Replacement};
 use super::{App, Saved};
 use crate::command::Command;
-use crate::design::Designer;
 use crate::document::{self, Base, Content, Document, Left, Opened};
-use crate::experiments::Settings;
 use crate::job::{Job, Outcome, Reporter, Waker};
-use crate::layout::Node;
 use crate::session::Session;
 use crate::write_file::write_file;
 
@@ -51,14 +48,13 @@ impl App {
     fn watch(&mut self, settled: bool) {
         let layout = self.layout.node();
         let now = self.undo.now();
-        let is_same = now.base == self.base
+        let is_same = (now.base, now.ledger) == (self.base, self.ledger)
             && now.session == self.session
             && now.comparison == self.designer.comparison()
             && now.experiment == *self.experiments.settings()
             && now.layout.is_alike(&layout);
-        let content =
-            || content_of(&self.session, self.base, &self.designer, self.experiments.settings(), layout);
-        self.undo.watch(content, is_same, settled);
+        let other = (!is_same).then(|| self.content());
+        self.undo.watch(other, settled);
     }
 
     /// One step back, or forth.
@@ -76,6 +72,7 @@ impl App {
             self.layout.set_node(&content.layout);
             self.layout.select(self.tab);
         }
+        self.show_ledger(content.ledger);
         if content.base != self.base {
             self.take_base(content.base, content.session);
         } else if content.session != self.session {
@@ -86,6 +83,14 @@ impl App {
         }
         self.designer.compare(content.comparison);
         self.say(format!("{}: {name}.", if redo { "Done again" } else { "Undone" }));
+    }
+
+    /// Shows one of the ledgers that were opened.
+    fn show_ledger(&mut self, number: usize) {
+        if number != self.ledger {
+            let before = self.runs.take(std::mem::take(&mut self.ledgers[number]));
+            self.ledgers[std::mem::replace(&mut self.ledger, number)] = before;
+        }
     }
 
     /// Goes to a model that was loaded before.
@@ -126,7 +131,7 @@ impl App {
             dark: Some(ctx.global_style().visuals.dark_mode),
             zoom: Some(ctx.zoom_factor()),
             degrees: Some(self.experiments.degrees()),
-            runs: Some(self.runs.to_value()),
+            runs: Some(self.runs.ledger().clone()),
         }
     }
 
@@ -155,21 +160,32 @@ impl App {
         if let Some(value) = &document.connection {
             problems.extend(self.robot.form.take_value(value).err());
         }
-        if let Some(value) = &document.runs {
-            problems.extend(self.runs.take_value(value).err());
-        }
         problems
     }
 
     /// Takes over how the window of before looked: where this one begins, so nothing that can be undone.
     fn begin_as(&mut self, document: &Document, ctx: &Context) {
         self.watch(true);
+        if let Some(runs) = &document.runs {
+            self.runs.take(runs.clone());
+        }
         for problem in self.take_surroundings(document, ctx) {
             self.fail(format!("The session of before: {problem}."));
         }
-        let layout = self.layout.node();
-        let experiment = self.experiments.settings();
-        self.undo.rebase(content_of(&self.session, self.base, &self.designer, experiment, layout));
+        let now = self.content();
+        self.undo.rebase(now);
+    }
+
+    /// What undo would bring back.
+    fn content(&self) -> Content {
+        Content {
+            session: self.session.clone(),
+            base: self.base,
+            ledger: self.ledger,
+            comparison: self.designer.comparison(),
+            experiment: self.experiments.settings().clone(),
+            layout: self.layout.node(),
+        }
     }
 
     /// Takes over a session as a whole; nothing is connected by that. Says whether it was taken.
@@ -193,6 +209,10 @@ impl App {
         }
         if let Some(log) = document.log.clone() {
             self.commands.send(Command::LoadLog(log));
+        }
+        if let Some(runs) = &document.runs {
+            self.ledgers.push(runs.clone());
+            self.show_ledger(self.ledgers.len() - 1);
         }
         for problem in self.take_surroundings(document, ctx) {
             self.fail(format!("{name}: {problem}."));
@@ -226,9 +246,9 @@ impl App {
                 ctx.request_repaint_after(wait);
             }
         } else {
-            let text = self.document(ctx).to_json();
+            let document = self.document(ctx);
             if let Some(store) = &mut self.store {
-                store.keep(text, &self.waker);
+                store.keep(document, &self.waker);
             }
         }
         match said {
@@ -314,12 +334,12 @@ impl App {
                 .fail("A session file is still being read or written: try again when that has ended.");
         }
         let path = with_ending(path);
-        let (file, text) = (path.clone(), self.document(ctx).to_json());
+        let (file, document) = (path.clone(), self.document(ctx));
         let write = move |_: &Reporter<()>| {
             if !replace && file.symlink_metadata().is_ok() {
                 return Ok(Saved::AnotherIsThere);
             }
-            write_file(&file, text.as_bytes()).map(|()| Saved::Written).map_err(|error| {
+            write_file(&file, document.to_json().as_bytes()).map(|()| Saved::Written).map_err(|error| {
                 format!("{} could not be saved: {error}; nothing was changed", file.display())
             })
         };
@@ -341,11 +361,7 @@ impl App {
                 Outcome::Done(Ok(text)) => {
                     let (document, problems) = Document::from_json(&text);
                     if document != Document::default() {
-                        if document.model.is_some() && self.session != self.saved {
-                            self.ask_replacement(Replacement::Session(Box::new(document), path.clone()));
-                        } else {
-                            self.take_session(&path, &document, ctx);
-                        }
+                        self.offer_session(document, path.clone(), ctx);
                     }
                     self.say_unread(&path, &problems);
                 }
@@ -366,6 +382,17 @@ impl App {
                 Outcome::Done(Err(problem)) => self.fail(problem),
                 Outcome::Broken => self.fail("Saving the session failed: this is a defect of flqr."),
             },
+        }
+    }
+
+    /// Takes over a session, after a question where changes of the model or runs would be replaced.
+    fn offer_session(&mut self, document: Document, path: PathBuf, ctx: &Context) {
+        let loses_model = document.model.is_some() && self.session != self.saved;
+        let loses_runs = document.runs.as_ref().is_some_and(|runs| self.runs.ledger().missing_in(runs) > 0);
+        if (loses_model || loses_runs) && !self.link.is_hot() {
+            self.ask_replacement(Replacement::Session(Box::new(document), path));
+        } else {
+            self.take_session(&path, &document, ctx);
         }
     }
 
@@ -397,21 +424,5 @@ impl App {
         if let Some(store) = &mut self.store {
             store.close(&text);
         }
-    }
-}
-
-pub(super) fn content_of(
-    session: &Session,
-    base: usize,
-    designer: &Designer,
-    experiment: &Settings,
-    layout: Node,
-) -> Content {
-    Content {
-        session: session.clone(),
-        base,
-        comparison: designer.comparison(),
-        experiment: experiment.clone(),
-        layout,
     }
 }

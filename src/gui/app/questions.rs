@@ -2,7 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use egui::{Context, Grid, Modal, RichText, ScrollArea, TextEdit, Ui, vec2};
+use egui::text::{LayoutJob, TextFormat};
+use egui::{
+    Button, Color32, Context, Grid, Key, Modal, Modifiers, RichText, ScrollArea, Stroke, TextEdit, TextStyle,
+    Ui, vec2,
+};
 use flqr_core::model_file::{Change, Model, presets};
 
 use super::{App, apply};
@@ -37,6 +41,13 @@ pub(super) enum Question {
 pub(super) enum Replacement {
     Model(Box<Model>, PathBuf),
     Session(Box<Document>, PathBuf),
+}
+
+/// What a question has come to in a frame.
+struct Reply {
+    answer: Answer,
+    /// Name of the answer that has the keyboard's focus.
+    focus: Option<&'static str>,
 }
 
 /// What an answer asks for.
@@ -110,7 +121,10 @@ impl App {
 
     /// Draws the open question.
     pub(super) fn question_ui(&mut self, ctx: &Context) {
-        let Some(mut question) = self.question.take() else { return };
+        let Some(mut question) = self.question.take() else {
+            self.question_focus = None;
+            return;
+        };
         let mut stop = false;
         let modal = Modal::new(egui::Id::unique("question")).show(ctx, |ui| {
             ui.set_width(560.0_f32.min(ctx.content_rect().width() - 40.0).max(0.0));
@@ -122,7 +136,11 @@ impl App {
         if stop {
             self.link.stop();
         }
-        let answer = match modal.inner {
+        if self.question_focus != modal.inner.focus {
+            self.question_focus = modal.inner.focus;
+            ctx.request_repaint();
+        }
+        let answer = match modal.inner.answer {
             Answer::Open if modal.should_close() && !matches!(question, Question::Restore { .. }) => {
                 Answer::Close
             }
@@ -182,7 +200,7 @@ impl App {
         ctx.request_repaint();
     }
 
-    fn ask_ui(&self, question: &mut Question, ui: &mut Ui) -> Answer {
+    fn ask_ui(&self, question: &mut Question, ui: &mut Ui) -> Reply {
         match question {
             Question::Leave => self.leave_ui(ui),
             Question::Preset { number, name, changes } => preset_ui(*number, name, changes, ui),
@@ -196,39 +214,50 @@ impl App {
         }
     }
 
-    fn leave_ui(&self, ui: &mut Ui) -> Answer {
+    fn leave_ui(&self, ui: &mut Ui) -> Reply {
         ui.heading("Save the model?");
         ui.label(format!("“{}” has changes that are in no file.", self.session.name));
         changes_ui(&self.saved.model().changes_to(&self.session.model()), ui);
         answers_ui(
             ui,
             [
-                ("Save and close", "Save the model, then close the window", Answer::SaveAndLeave),
-                ("Discard and close", "Close the window; the changes are lost", Answer::Discard),
-                ("Cancel", "Go on", Answer::Close),
+                (Key::S, "Save and close", "Save the model, then close the window", Answer::SaveAndLeave),
+                (Key::D, "Discard and close", "Close the window; the changes are lost", Answer::Discard),
+                (Key::C, "Cancel", "Go on", Answer::Close),
             ],
         )
     }
 
-    fn replace_ui(&self, by: &Replacement, changes: &[Change], ui: &mut Ui) -> Answer {
+    fn replace_ui(&self, by: &Replacement, changes: &[Change], ui: &mut Ui) -> Reply {
         let (Replacement::Model(_, path) | Replacement::Session(_, path)) = by;
         ui.heading(format!("Open {}?", path.display()));
-        ui.label(format!(
-            "“{}” has changes that are in no file. {} values change; undo brings those of now back.",
-            self.session.name,
-            changes.len()
-        ));
+        let mut losses = Vec::new();
+        if self.session != self.saved {
+            losses.push(format!("“{}” has changes that are in no file.", self.session.name));
+        }
+        let runs = match by {
+            Replacement::Session(document, _) => document.runs.as_ref(),
+            Replacement::Model(..) => None,
+        };
+        let missing = runs.map_or(0, |runs| self.runs.ledger().missing_in(runs));
+        if missing > 0 {
+            losses.push(format!("{} of the Runs page that the file has not go too.", listed(missing, "row")));
+        }
+        if !changes.is_empty() {
+            losses.push(format!("{} of the model change.", listed(changes.len(), "value")));
+        }
+        ui.label(format!("{} Undo brings all of now back.", losses.join(" ")));
         changes_ui(changes, ui);
         answers_ui(
             ui,
             [
-                ("Replace the model", "Open the file in place of the model", Answer::Replace),
-                ("Keep the model", "Leave the model as it is", Answer::Close),
+                (Key::R, "Replace it", "Open the file in place of what there is now", Answer::Replace),
+                (Key::K, "Keep it", "Leave all as it is", Answer::Close),
             ],
         )
     }
 
-    fn steps_ui(&self, ui: &mut Ui) -> Answer {
+    fn steps_ui(&self, ui: &mut Ui) -> Reply {
         ui.heading("Steps");
         let mut answer = Answer::Open;
         ScrollArea::vertical().max_height(LONGEST_TABLE).show(ui, |ui| {
@@ -249,11 +278,17 @@ impl App {
                 }
             }
         });
-        match answers_ui(ui, [("Close", "Back to the page", Answer::Close)]) {
-            Answer::Open => answer,
-            closed => closed,
+        let reply = answers_ui(ui, [(Key::C, "Close", "Back to the page", Answer::Close)]);
+        match reply.answer {
+            Answer::Open => Reply { answer, ..reply },
+            _ => reply,
         }
     }
+}
+
+/// “1 row”, “2 rows”.
+fn listed(count: usize, name: &str) -> String {
+    format!("{count} {name}{}", if count == 1 { "" } else { "s" })
 }
 
 /// What a session is called in sentences.
@@ -261,20 +296,41 @@ fn document_name(document: &Document) -> String {
     document.model.as_ref().map_or_else(|| "before".to_owned(), |model| format!("“{}”", model.name))
 }
 
-fn answers_ui<const N: usize>(ui: &mut Ui, answers: [(&str, &str, Answer); N]) -> Answer {
+/// The answers, each with the letter that gives it while no text is being typed.
+fn answers_ui<const N: usize>(ui: &mut Ui, answers: [(Key, &'static str, &str, Answer); N]) -> Reply {
     ui.add_space(6.0);
-    let mut taken = Answer::Open;
+    let mut reply = Reply { answer: Answer::Open, focus: None };
+    let typing = ui.ctx().text_edit_focused();
     ui.horizontal(|ui| {
-        for (name, help, answer) in answers {
-            if ui.button(name).on_hover_text(help).clicked() {
-                taken = answer;
+        for (key, name, help, answer) in answers {
+            let button = ui.add(Button::new(with_letter(ui, key, name))).accessible_name(name);
+            if button.has_focus() {
+                reply.focus = Some(name);
+            }
+            let pressed = !typing && ui.input_mut(|input| input.consume_key(Modifiers::NONE, key));
+            if button.on_hover_text(format!("{help} ({})", key.name())).clicked() || pressed {
+                reply.answer = answer;
             }
         }
     });
-    taken
+    reply
 }
 
-fn preset_ui(number: usize, name: &str, changes: &[Change], ui: &mut Ui) -> Answer {
+/// `name` with the letter of `key` underlined where it comes first.
+fn with_letter(ui: &Ui, key: Key, name: &str) -> LayoutJob {
+    let font = TextStyle::Button.resolve(ui.style());
+    let plain = TextFormat::simple(font, Color32::PLACEHOLDER);
+    let line = Stroke::new(1.0, ui.visuals().widgets.inactive.fg_stroke.color);
+    let marked = TextFormat { underline: line, ..plain.clone() };
+    let at = name.to_uppercase().find(key.name()).unwrap_or(0);
+    let mut job = LayoutJob::default();
+    for (part, format) in [(&name[..at], &plain), (&name[at..=at], &marked), (&name[at + 1..], &plain)] {
+        job.append(part, 0.0, format.clone());
+    }
+    job
+}
+
+fn preset_ui(number: usize, name: &str, changes: &[Change], ui: &mut Ui) -> Reply {
     ui.heading(format!("Load the preset “{name}”?"));
     if changes.is_empty() {
         ui.label("It is what the window shows already.");
@@ -285,21 +341,21 @@ fn preset_ui(number: usize, name: &str, changes: &[Change], ui: &mut Ui) -> Answ
     answers_ui(
         ui,
         [
-            ("Load the preset", "Replace the model", Answer::Send(Command::TakePreset(number))),
-            ("Keep the model", "Leave the model as it is", Answer::Close),
+            (Key::L, "Load the preset", "Replace the model", Answer::Send(Command::TakePreset(number))),
+            (Key::K, "Keep the model", "Leave the model as it is", Answer::Close),
         ],
     )
 }
 
-fn overwrite_ui(path: &Path, ui: &mut Ui) -> Answer {
+fn overwrite_ui(path: &Path, ui: &mut Ui) -> Reply {
     ui.heading("Replace the file?");
     ui.label(format!("There is already a file {}.", path.display()));
     let replace = Command::SaveSession { path: path.to_owned(), replace: true };
     answers_ui(
         ui,
         [
-            ("Replace it", "Save the session in its place", Answer::Send(replace)),
-            ("Cancel", "Leave the file as it is", Answer::Close),
+            (Key::R, "Replace it", "Save the session in its place", Answer::Send(replace)),
+            (Key::C, "Cancel", "Leave the file as it is", Answer::Close),
         ],
     )
 }
@@ -323,7 +379,7 @@ fn changes_ui(changes: &[Change], ui: &mut Ui) {
     });
 }
 
-fn restore_ui(document: &Document, whole: bool, ui: &mut Ui) -> Answer {
+fn restore_ui(document: &Document, whole: bool, ui: &mut Ui) -> Reply {
     ui.heading("flqr was not closed the last time");
     ui.label(format!(
         "The session of {} was kept, with changes that are in no file:",
@@ -338,8 +394,8 @@ fn restore_ui(document: &Document, whole: bool, ui: &mut Ui) -> Answer {
     answers_ui(
         ui,
         [
-            ("Restore it", "Go on with the model as it was", Answer::Restore),
-            ("Start afresh", "Leave the kept session in its file", Answer::StartAfresh),
+            (Key::R, "Restore it", "Go on with the model as it was", Answer::Restore),
+            (Key::S, "Start afresh", "Leave the kept session in its file", Answer::StartAfresh),
         ],
     )
 }
@@ -351,7 +407,7 @@ fn path_ui(
     has_focus: &mut bool,
     recent: &Recent,
     ui: &mut Ui,
-) -> Answer {
+) -> Reply {
     ui.heading(title(purpose));
     if let Some(reason) = reason {
         warning_ui(ui, reason);
@@ -365,25 +421,26 @@ fn path_ui(
     for path in recent_of(purpose, recent) {
         if ui.button(path.display().to_string()).on_hover_text("Used before").clicked() {
             *text = path.display().to_string();
-            return taken(purpose, text);
+            return Reply { answer: taken(purpose, text), focus: None };
         }
     }
     let exists = saves(purpose) && !text.trim().is_empty() && Path::new(text.trim()).exists();
     if exists {
         warning_ui(ui, "There is such a file: it is replaced only after a question.");
     }
-    let answer = answers_ui(
+    let reply = answers_ui(
         ui,
         [
-            ("OK", "Take this path", Answer::Send(Command::Say(String::new()))),
-            ("Cancel", "Go back", Answer::Close),
+            (Key::O, "OK", "Take this path", Answer::Send(Command::Say(String::new()))),
+            (Key::C, "Cancel", "Go back", Answer::Close),
         ],
     );
-    match answer {
+    let answer = match reply.answer {
         Answer::Send(_) => taken(purpose, text),
         Answer::Open if entered => taken(purpose, text),
         other => other,
-    }
+    };
+    Reply { answer, ..reply }
 }
 
 fn taken(purpose: FilePurpose, text: &str) -> Answer {

@@ -15,6 +15,7 @@ use serde_json::{Value, json};
 
 use crate::command::Source;
 use crate::layout::Node;
+use crate::runs::Ledger;
 use crate::tab::Tab;
 use members::members;
 pub use store::default_folder;
@@ -46,8 +47,7 @@ pub(crate) struct Document {
     pub(crate) dark: Option<bool>,
     pub(crate) zoom: Option<f32>,
     pub(crate) degrees: Option<bool>,
-    /// Rows of the run ledger, as it writes them.
-    pub(crate) runs: Option<Value>,
+    pub(crate) runs: Option<Ledger>,
 }
 
 impl Document {
@@ -85,7 +85,7 @@ impl Document {
             "theme": self.dark.map(|dark| if dark { "dark" } else { "light" }),
             "zoom": self.zoom,
             "angles": self.degrees.map(|degrees| if degrees { "deg" } else { "rad" }),
-            "runs": self.runs,
+            "runs": self.runs.as_ref().map(Ledger::to_value),
         });
         format!("{value:#}\n")
     }
@@ -161,7 +161,11 @@ impl Document {
                 self.zoom = Some(zoom as f32);
             }
             "angles" => self.degrees = Some(text()? == "deg"),
-            "runs" => self.runs = Some(value.clone()),
+            "runs" => {
+                let (runs, problem) = Ledger::from_value(value)?;
+                self.runs = Some(runs);
+                return problem.map_or(Ok(()), Err);
+            }
             _ => return Err(format!("“{key}” is not known and was left out")),
         }
         Ok(())
@@ -174,10 +178,13 @@ mod tests {
 
     use super::*;
     use crate::layout::Side;
+    use crate::runs::{Run, RunKind, Sources};
 
     fn whole() -> Document {
         let mut edited = presets::paper();
         edited.name = "“edited” \\ \n model".to_owned();
+        let mut runs = Ledger::default();
+        runs.add(Run::new(RunKind::Fit, "a fit", Some(&edited), Sources::new(Some(&edited), [])), 7);
         Document {
             model: Some(edited),
             saved_model: Some(presets::paper()),
@@ -193,7 +200,7 @@ mod tests {
             dark: Some(false),
             zoom: Some(1.5),
             degrees: Some(true),
-            runs: Some(json!([{ "note": "first" }])),
+            runs: Some(runs),
         }
     }
 

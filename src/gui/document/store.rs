@@ -7,7 +7,7 @@ use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use super::{EXTENSION, LARGEST_BYTES};
+use super::{Document, EXTENSION, LARGEST_BYTES};
 use crate::job::{Job, Outcome, Reporter, Waker};
 use crate::write_file::write_file;
 
@@ -131,7 +131,7 @@ pub(crate) struct Store {
     path: PathBuf,
     /// Held until the program ends.
     _lock: File,
-    written: String,
+    written: Option<Document>,
     looked: Option<Instant>,
     job: Option<Job<(), Result<(), String>>>,
     failed: bool,
@@ -147,7 +147,7 @@ impl Store {
             folder,
             path,
             _lock: lock,
-            written: String::new(),
+            written: None,
             looked: None,
             job: None,
             failed: false,
@@ -160,7 +160,7 @@ impl Store {
     pub(crate) fn take_over(&mut self, left: Left) {
         self.taken.push(left);
         // Written at the next look, whatever is there already.
-        self.written.clear();
+        self.written = None;
         self.looked = None;
     }
 
@@ -169,15 +169,15 @@ impl Store {
         INTERVAL.checked_sub(self.looked?.elapsed()).filter(|wait| !wait.is_zero())
     }
 
-    /// Keeps `text` if it is new, on a thread.
-    pub(crate) fn keep(&mut self, text: String, waker: &Waker) {
+    /// Keeps a session if it is new, on a thread: a long ledger takes its time to be put into words.
+    pub(crate) fn keep(&mut self, document: Document, waker: &Waker) {
         self.looked = Some(Instant::now());
-        if text == self.written || self.job.is_some() {
+        if self.job.is_some() || self.written.as_ref() == Some(&document) {
             return;
         }
-        let (path, content) = (self.path.clone(), text.clone());
+        let (path, content) = (self.path.clone(), document.clone());
         let write = move |_: &Reporter<()>| {
-            write_file(&path, content.as_bytes()).map_err(|error| {
+            write_file(&path, content.to_json().as_bytes()).map_err(|error| {
                 format!(
                     "The session could not be kept in {}: {error}; what was kept last is still there. Make room or save to another disk.",
                     path.display()
@@ -186,7 +186,7 @@ impl Store {
         };
         if let Ok(job) = Job::start("keep-session", waker, write) {
             self.job = Some(job);
-            self.written = text;
+            self.written = Some(document);
             self.in_job.append(&mut self.taken);
         }
     }
@@ -203,7 +203,7 @@ impl Store {
         match result {
             Err(problem) => {
                 // Tried again at the next look.
-                self.written.clear();
+                self.written = None;
                 self.taken.append(&mut self.in_job);
                 (!failed_before).then_some(Err(problem))
             }
@@ -257,7 +257,7 @@ mod tests {
 
     fn keep(store: &mut Store, text: &str) -> Option<Result<String, String>> {
         let waker: Waker = std::sync::Arc::new(|| {});
-        store.keep(text.to_owned(), &waker);
+        store.keep(Document { column_map: Some(text.to_owned()), ..Document::default() }, &waker);
         while store.job.is_some() {
             if let Some(said) = store.drain() {
                 return Some(said);
@@ -265,6 +265,11 @@ mod tests {
             std::thread::yield_now();
         }
         None
+    }
+
+    /// What was given to `keep`, of the text of a file.
+    fn kept(text: &str) -> String {
+        Document::from_json(text).0.column_map.unwrap()
     }
 
     #[test]
@@ -289,12 +294,12 @@ mod tests {
         drop(opened);
         for _ in 0..2 {
             let mut found = open(&folder.0);
-            assert_eq!(found.left.as_ref().unwrap().text, "unsaved");
+            assert_eq!(kept(&found.left.as_ref().unwrap().text), "unsaved");
             assert!(open(&folder.0).left.is_none(), "not by two windows at a time");
             found.store.as_mut().unwrap().close("nothing");
         }
         let path = open(&folder.0).left.unwrap().put_aside();
-        assert_eq!(std::fs::read_to_string(&path).unwrap(), "unsaved");
+        assert_eq!(kept(&std::fs::read_to_string(&path).unwrap()), "unsaved");
         assert!(open(&folder.0).left.is_none(), "it was answered, and stays where it was put");
         assert!(path.exists());
     }
@@ -340,7 +345,7 @@ mod tests {
         let third = open(&folder.0);
         assert!(third.left.is_none(), "both are running: {:?}", third.left);
         drop(second);
-        assert_eq!(open(&folder.0).left.map(|left| left.text).as_deref(), Some("second"));
+        assert_eq!(kept(&open(&folder.0).left.unwrap().text), "second");
     }
 
     #[test]

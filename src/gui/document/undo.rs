@@ -18,6 +18,8 @@ pub(crate) struct Content {
     pub(crate) session: Session,
     /// Which of the loaded models it was made from.
     pub(crate) base: usize,
+    /// Which of the opened ledgers is shown.
+    pub(crate) ledger: usize,
     pub(crate) comparison: Comparison,
     pub(crate) experiment: Settings,
     pub(crate) layout: Node,
@@ -26,7 +28,7 @@ pub(crate) struct Content {
 impl Content {
     /// Whether nothing that is worth a step differs; which page is in front is not.
     fn is_alike(&self, other: &Self) -> bool {
-        self.base == other.base
+        (self.base, self.ledger) == (other.base, other.ledger)
             && self.session == other.session
             && self.comparison == other.comparison
             && self.experiment == other.experiment
@@ -91,16 +93,15 @@ impl Undo {
         self.name = Some(name.into());
     }
 
-    /// Takes in what there is now. A difference becomes a step as soon as no drag is under way.
-    pub(crate) fn watch(&mut self, present: impl FnOnce() -> Content, is_same: bool, settled: bool) {
-        if is_same {
+    /// Takes in what there is now, if that is not what there was. It becomes a step as soon as no drag is under way.
+    pub(crate) fn watch(&mut self, other: Option<Content>, settled: bool) {
+        let Some(present) = other else {
             self.name = None;
             return;
-        }
+        };
         if !settled {
             return;
         }
-        let present = present();
         if self.now.is_alike(&present) {
             self.now = present;
             return;
@@ -222,6 +223,7 @@ mod tests {
             Content {
                 session,
                 base: 0,
+                ledger: 0,
                 comparison: Comparison::default(),
                 experiment: Settings::default(),
                 layout,
@@ -245,11 +247,11 @@ mod tests {
         let start = undo.now().clone();
         for pitch in [110.0, 120.0, 130.0] {
             let content = with_weight(&undo, pitch);
-            undo.watch(|| content, false, false);
+            undo.watch(Some(content), false);
         }
         assert_eq!(undo.undoable().count(), 0, "the button is still down");
         let end = with_weight(&undo, 140.0);
-        undo.watch(|| end.clone(), false, true);
+        undo.watch(Some(end.clone()), true);
         let names: Vec<_> = undo.undoable().map(str::to_owned).collect();
         assert_eq!(names.len(), 1);
         assert!(names[0].contains("→ 140"), "{names:?}");
@@ -265,7 +267,7 @@ mod tests {
         let mut undo = begin();
         for pitch in 0..300 {
             let content = with_weight(&undo, 200.0 + f64::from(pitch));
-            undo.watch(|| content, false, true);
+            undo.watch(Some(content), true);
         }
         assert_eq!(undo.undoable().count(), LONGEST);
         undo.go(false).unwrap();
@@ -273,7 +275,7 @@ mod tests {
         assert_eq!(undo.redoable().count(), 2);
         let mut content = undo.now().clone();
         content.session.controller = ControllerKind::Lqr;
-        undo.watch(|| content, false, true);
+        undo.watch(Some(content), true);
         assert_eq!(undo.redoable().count(), 0);
         assert_eq!(undo.undoable().next(), Some("controller LQR"));
     }
@@ -283,12 +285,12 @@ mod tests {
         let mut undo = begin();
         let mut content = undo.now().clone();
         content.layout = Node::Tabs { tabs: Tab::ALL.to_vec(), active: Some(Tab::Robot) };
-        undo.watch(|| content, false, true);
+        undo.watch(Some(content), true);
         assert_eq!(undo.undoable().count(), 0);
         let mut content = undo.now().clone();
         content.layout = content.layout.moved(Tab::Robot, Side::Right);
         undo.call("Robot to the right");
-        undo.watch(|| content, false, true);
+        undo.watch(Some(content), true);
         assert_eq!(undo.undoable().collect::<Vec<_>>(), ["Robot to the right"]);
     }
 }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::run::{Recorded, Variant};
 use super::runs::Comparison;
-use crate::runs::{Channel, Run, RunKind, RunsTab, Series, Value};
+use crate::runs::{Channel, Run, RunKind, RunsTab, Series, Sources, Value};
 use crate::widgets::shown;
 
 impl Comparison {
@@ -22,11 +22,12 @@ impl Comparison {
     fn row(&self, variant: Variant, run: &Recorded) -> Run {
         let settings = &self.settings;
         let title = format!("{}, {}", settings.scenario.name(), variant.title(settings.scenario));
-        let mut row = Run::new(RunKind::Experiment, title, Some(&self.model), &[])
-            .with("setting.scenario", Value::Text(settings.scenario.name().to_owned()))
-            .with("setting.controller", Value::Text(variant.name(settings.scenario).to_owned()))
-            .with("setting.seconds", Value::Number(settings.seconds))
-            .with("setting.seed", Value::Number(settings.seed as f64));
+        let mut row =
+            Run::new(RunKind::Experiment, title, Some(&self.model), Sources::new(Some(&self.model), []))
+                .with("setting.scenario", Value::Text(settings.scenario.name().to_owned()))
+                .with("setting.controller", Value::Text(variant.name(settings.scenario).to_owned()))
+                .with("setting.seconds", Value::Number(settings.seconds))
+                .with("setting.seed", Value::Number(settings.seed as f64));
         if let Some(gains) = settings.speed_gains {
             row = row.with("setting.kp", Value::Number(gains.kp)).with("setting.ki", Value::Number(gains.ki));
         }

@@ -14,7 +14,7 @@ use crate::command::Command;
 use crate::context::ViewContext;
 use crate::job::{Job, Outcome, Waker};
 use crate::load::LoadedLog;
-use crate::runs::{Run, RunKind, Value};
+use crate::runs::{Run, RunKind, Sources, Value};
 use crate::widgets::{choice_ui, error_ui, hint_ui, section_ui, shown};
 
 /// One report of the optimiser.
@@ -25,6 +25,9 @@ pub(super) struct Step {
     best_error: f64,
     best: Option<StribeckParameters>,
 }
+
+/// The result and what it was made from, or why there is none.
+type Ended = Result<(FitReport, Sources), String>;
 
 /// Options, the running fit, and the last result.
 pub(super) struct FitRun {
@@ -37,7 +40,7 @@ pub(super) struct FitRun {
     from_model: bool,
     /// `from_model` of the fit that runs or has ended.
     pub(super) held: bool,
-    job: Option<Job<Step, Result<FitReport, String>>>,
+    job: Option<Job<Step, Ended>>,
     /// Iteration and log10 of the best error, for the plot.
     pub(super) convergence: Vec<[f64; 2]>,
     last_step: Option<Step>,
@@ -78,14 +81,14 @@ struct MadeWith {
 }
 
 impl MadeWith {
-    fn row(&self, report: &FitReport) -> Run {
+    fn row(&self, report: &FitReport, sources: Sources) -> Run {
         let Self { log, model, motor, options } = self;
         let name = Path::new(&log.source)
             .file_name()
             .map_or(log.source.as_str().into(), |name| name.to_string_lossy());
         let motor = if *motor == Motor::Left { "left" } else { "right" };
         let method = if options.method == Method::Best { "best" } else { "pso" };
-        let mut row = Run::new(RunKind::Fit, format!("friction, {motor}, {name}"), model.as_ref(), &[log])
+        let mut row = Run::new(RunKind::Fit, format!("friction, {motor}, {name}"), model.as_ref(), sources)
             .with("fit.log", Value::Text(log.source.clone()))
             .with("fit.motor", Value::Text(motor.to_owned()))
             .with("fit.method", Value::Text(method.to_owned()))
@@ -129,8 +132,9 @@ impl FitRun {
                     best: progress.best,
                 })
             };
-            fit(std::slice::from_ref(&*log), model.as_ref(), motor, &options, &mut watch)
-                .map_err(|error| error.to_string())
+            let report = fit(std::slice::from_ref(&*log), model.as_ref(), motor, &options, &mut watch)
+                .map_err(|error| error.to_string())?;
+            Ok((report, Sources::new(model.as_ref(), [&*log])))
         };
         self.job = Some(Job::start("fit", waker, work).map_err(|e| format!("No thread for the fit: {e}."))?);
         self.made_with = Some(made_with);
@@ -183,11 +187,11 @@ impl FitRun {
         };
         self.job = None;
         Some(match result {
-            Ok(report) => {
+            Ok((report, sources)) => {
                 let text =
                     format!("The fit ended with an error of {:.3e} {}.", report.rmse, report.rmse_unit);
                 self.show_history(&report);
-                self.finished = self.made_with.take().map(|made_with| made_with.row(&report));
+                self.finished = self.made_with.take().map(|made_with| made_with.row(&report, sources));
                 self.report = Some(report);
                 text
             }

@@ -10,13 +10,13 @@ impl RefineTab {
         let refined = self.run.refined.as_ref().filter(|refined| self.noted != Some(refined.generation))?;
         self.noted = Some(refined.generation);
         let (made, found) = (&refined.made, &refined.answer);
-        let logs: Vec<_> = made.inputs.iter().map(|input| &*input.log).collect();
         let name =
             |path: &std::path::Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let names: Vec<String> = made.inputs.iter().map(|input| name(&input.path)).collect();
-        let mut row = Run::new(RunKind::Refinement, names.join(", "), Some(&made.model), &logs)
-            .with("refine.seed", Value::Number(made.settings.seed as f64))
-            .with("refine.estimate", Value::Text(made.settings.estimate.clone()));
+        let mut row =
+            Run::new(RunKind::Refinement, names.join(", "), Some(&made.model), refined.sources.clone())
+                .with("refine.seed", Value::Number(made.settings.seed as f64))
+                .with("refine.estimate", Value::Text(made.settings.estimate.clone()));
         let verdict = serde_json::json!(found.verdict);
         let mut result = verdict.as_str().unwrap_or_default().replace('_', " ");
         for effect in &found.effects {

@@ -14,6 +14,7 @@ use flqr_core::robot::Motor;
 use super::sources::Input;
 use crate::job::{Job, Outcome, Reporter, Waker};
 use crate::load::LoadedLog;
+use crate::runs::Sources;
 use crate::shell_word::quoted;
 
 /// What can be asked.
@@ -119,6 +120,7 @@ pub(super) struct Answered<T> {
     /// The file that held the model when the question was put.
     pub(super) model_path: Option<PathBuf>,
     pub(super) answer: T,
+    pub(super) sources: Sources,
     /// Differs from that of any other answer.
     pub(super) generation: u64,
 }
@@ -130,7 +132,7 @@ enum Answer {
 }
 
 enum End {
-    Answered(Answer),
+    Answered(Answer, Sources),
     Cancelled,
     Refused(String),
 }
@@ -209,7 +211,7 @@ impl Run {
         let Running { question, made, model_path, .. } = self.running.take()?;
         self.generation += 1;
         let generation = self.generation;
-        let answered = matches!(end, End::Answered(_));
+        let answered = matches!(end, End::Answered(..));
         let mut records = None;
         let text = match end {
             End::Cancelled => "Cancelled: what was found before is still shown.".to_owned(),
@@ -217,23 +219,24 @@ impl Run {
                 self.problem = Some(problem.clone());
                 format!("{problem}.")
             }
-            End::Answered(Answer::Residual(answer)) => {
-                self.residual = Some(Answered { made, model_path, answer, generation });
+            End::Answered(Answer::Residual(answer), sources) => {
+                self.residual = Some(Answered { made, model_path, answer, sources, generation });
                 "The residual of the model is there.".to_owned()
             }
-            End::Answered(Answer::Refined(answer)) => {
+            End::Answered(Answer::Refined(answer), sources) => {
                 let text = format!("{}.", verdict_text(&answer));
                 self.truth = None;
-                self.refined = Some(Answered { made, model_path, answer, generation });
+                self.refined = Some(Answered { made, model_path, answer, sources, generation });
                 text
             }
-            End::Answered(Answer::Shown(shown)) => {
+            End::Answered(Answer::Shown(shown), sources) => {
                 let Demonstration { found, truth, logs } = *shown;
                 let text = format!("{}.", verdict_text(&found));
                 let logs: Vec<LoadedLog> = logs.into_iter().map(LoadedLog::made).collect();
                 let made = Made { inputs: logs.iter().map(Input::made).collect(), ..made };
                 self.truth = Some(truth);
-                self.refined = Some(Answered { made, model_path, answer: Box::new(found), generation });
+                let answer = Box::new(found);
+                self.refined = Some(Answered { made, model_path, answer, sources, generation });
                 records = Some(logs);
                 text
             }
@@ -251,7 +254,15 @@ fn answer(question: Question, made: &Made, watch: &mut dyn FnMut(f64) -> Control
     };
     let answer = try_answer(question, made, &mut watch);
     match answer {
-        Ok(answer) => End::Answered(answer),
+        Ok(answer) => {
+            let sources = match &answer {
+                Answer::Shown(shown) => Sources::new(Some(&made.model), &shown.logs),
+                Answer::Residual(_) | Answer::Refined(_) => {
+                    Sources::new(Some(&made.model), made.inputs.iter().map(|input| &*input.log))
+                }
+            };
+            End::Answered(answer, sources)
+        }
         Err(_) if cancelled => End::Cancelled,
         Err(problem) => End::Refused(problem),
     }

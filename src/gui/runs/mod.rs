@@ -21,7 +21,7 @@ use crate::widgets::hint_ui;
 use changes::Changes;
 pub(crate) use command::RunsCommand;
 use overlay::Overlay;
-pub(crate) use run::{Channel, Ledger, Run, RunKind, Series, Value};
+pub(crate) use run::{Channel, Ledger, Run, RunKind, Series, Sources, Value};
 use table::RunTable;
 use watch::RecordingWatch;
 
@@ -46,15 +46,10 @@ impl RunsTab {
         self.ledger.add(run, now)
     }
 
-    /// Takes note of how the recording stands; adds a row once it has ended. `model` is that of the robot.
-    pub(crate) fn watch(
-        &mut self,
-        now: Option<&RecordingStatus>,
-        source: &str,
-        model: impl FnOnce() -> Model,
-    ) {
-        if let Some(ended) = self.recording.note(now) {
-            self.note(watch::row(&ended, source, &model()));
+    /// Takes note of how the recording stands; adds a row once it has ended. `model` is that of now.
+    pub(crate) fn watch(&mut self, now: Option<&RecordingStatus>, source: &str, model: impl Fn() -> Model) {
+        if let Some(row) = self.recording.note(now, source, model) {
+            self.note(row);
         }
     }
 
@@ -88,20 +83,18 @@ impl RunsTab {
         }
     }
 
-    /// What the session's file keeps.
-    pub(crate) fn to_value(&self) -> serde_json::Value {
-        self.ledger.to_value()
+    /// All rows.
+    pub(crate) fn ledger(&self) -> &Ledger {
+        &self.ledger
     }
 
-    /// Shows the rows that a session's file has kept.
-    ///
-    /// # Errors
-    /// A sentence about what of them cannot be read.
-    pub(crate) fn take_value(&mut self, value: &serde_json::Value) -> Result<(), String> {
-        let result = self.ledger.take_value(value);
+    /// Shows other rows; gives back those of before.
+    pub(crate) fn take(&mut self, mut ledger: Ledger) -> Ledger {
+        ledger.take_series(&self.ledger);
+        let before = std::mem::replace(&mut self.ledger, ledger);
         self.ticked.retain(|number| self.ledger.row(*number).is_some());
         self.deleted.clear();
-        result
+        before
     }
 
     /// What the page shows, as `--state-out` writes it.

@@ -76,6 +76,9 @@ pub(crate) struct Run {
     pub(crate) sources: String,
     /// All values that it was made with: those of the model, of the settings.
     pub(crate) made_with: BTreeMap<String, Value>,
+    /// What makes it in a terminal.
+    #[serde(default)]
+    pub(crate) command: Option<String>,
     /// What came of it, in one line.
     pub(crate) result: String,
     /// The user's own words.
@@ -85,8 +88,13 @@ pub(crate) struct Run {
 }
 
 impl Run {
-    /// A run that has just ended, made with `model` and `logs`.
-    pub(crate) fn new(kind: RunKind, title: impl Into<String>, model: Option<&Model>, logs: &[&Log]) -> Self {
+    /// A run that has just ended, made with `model` and `sources`.
+    pub(crate) fn new(
+        kind: RunKind,
+        title: impl Into<String>,
+        model: Option<&Model>,
+        sources: Sources,
+    ) -> Self {
         let made_with = model.map(Model::entries).unwrap_or_default().into_iter().map(|(key, entry)| {
             let value = match entry {
                 Entry::Number(number) => Value::Number(number),
@@ -94,20 +102,14 @@ impl Run {
             };
             (key, value)
         });
-        let mut hash = Hash::new();
-        if let Some(model) = model {
-            hash.text(&model.to_toml());
-        }
-        for log in logs {
-            hash.log(log);
-        }
         Self {
             number: 0,
             unix_s: 0,
             kind,
             title: title.into(),
             seed: None,
-            sources: hash.hex(),
+            sources: sources.0,
+            command: None,
             made_with: made_with.collect(),
             result: String::new(),
             note: String::new(),
@@ -153,19 +155,31 @@ impl Run {
 /// Values of all series that are kept; those of older runs go first.
 const MOST_VALUES: usize = 16_000_000;
 
-/// All rows; a part of the session's file.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+/// The largest number of a row that a file may have: whatever reads the file as JSON has it exactly.
+const LARGEST_NUMBER: u64 = 1 << 53;
+
+/// All rows; a part of the session's file. A copy shares them.
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Ledger {
     /// The number given last.
     last: u64,
-    rows: Vec<Run>,
+    rows: Vec<Arc<Run>>,
+}
+
+impl PartialEq for Ledger {
+    fn eq(&self, other: &Self) -> bool {
+        let same = |(row, other): (&Arc<Run>, &Arc<Run>)| Arc::ptr_eq(row, other) || row == other;
+        self.last == other.last
+            && self.rows.len() == other.rows.len()
+            && self.rows.iter().zip(&other.rows).all(same)
+    }
 }
 
 impl Ledger {
     /// Adds a row and gives it its number.
     pub(crate) fn add(&mut self, run: Run, unix_s: u64) -> u64 {
         self.last += 1;
-        self.rows.push(Run { number: self.last, unix_s, ..run });
+        self.rows.push(Arc::new(Run { number: self.last, unix_s, ..run }));
         self.forget_old_series();
         self.last
     }
@@ -174,62 +188,80 @@ impl Ledger {
         let mut kept = 0;
         for run in self.rows.iter_mut().rev() {
             kept += run.series.as_ref().map_or(0, |series| series.size());
-            if kept > MOST_VALUES {
-                run.series = None;
+            if kept > MOST_VALUES && run.series.is_some() {
+                Arc::make_mut(run).series = None;
             }
         }
     }
 
     /// Oldest first.
-    pub(crate) fn rows(&self) -> &[Run] {
+    pub(crate) fn rows(&self) -> &[Arc<Run>] {
         &self.rows
     }
 
     pub(crate) fn row(&self, number: u64) -> Option<&Run> {
-        self.rows.iter().find(|run| run.number == number)
+        self.rows.iter().map(|run| &**run).find(|run| run.number == number)
     }
 
     pub(super) fn row_mut(&mut self, number: u64) -> Option<&mut Run> {
-        self.rows.iter_mut().find(|run| run.number == number)
+        self.rows.iter_mut().find(|run| run.number == number).map(Arc::make_mut)
     }
 
     /// What the session's file keeps.
-    pub(super) fn to_value(&self) -> serde_json::Value {
-        serde_json::to_value(self).unwrap_or_default()
+    pub(crate) fn to_value(&self) -> serde_json::Value {
+        let rows: Vec<&Run> = self.rows.iter().map(|run| &**run).collect();
+        serde_json::json!({ "last": self.last, "rows": rows })
     }
 
-    /// Reads what a session's file has kept; rows that are here too keep their curves.
+    /// Reads what a session's file has kept, and a sentence about rows that cannot be read: they are left out.
     ///
     /// # Errors
-    /// A sentence about rows that cannot be read. They are left out, and the others are used.
-    pub(super) fn take_value(&mut self, value: &serde_json::Value) -> Result<(), String> {
+    /// It is no ledger.
+    pub(crate) fn from_value(value: &serde_json::Value) -> Result<(Self, Option<String>), String> {
         let kept = value.get("rows").and_then(serde_json::Value::as_array).ok_or("“runs” cannot be read")?;
-        let mut rows: Vec<Run> = kept.iter().filter_map(|row| Run::deserialize(row).ok()).collect();
+        let read = kept.iter().filter_map(|row| Run::deserialize(row).ok());
+        let mut rows: Vec<Arc<Run>> = read.filter(|row| row.number <= LARGEST_NUMBER).map(Arc::new).collect();
         rows.sort_by_key(|row| row.number);
         rows.dedup_by_key(|row| row.number);
-        for row in &mut rows {
-            let here = self
-                .row(row.number)
-                .filter(|here| (here.unix_s, &here.sources) == (row.unix_s, &row.sources));
-            row.series = here.and_then(|here| here.series.clone());
-        }
         let missing = kept.len() - rows.len();
-        let last = value.get("last").and_then(serde_json::Value::as_u64).unwrap_or(0);
-        self.last = rows.last().map_or(0, |row| row.number).max(last);
-        self.rows = rows;
-        if missing == 0 { Ok(()) } else { Err(format!("“runs” has {missing} rows that cannot be read")) }
+        let last = value.get("last").and_then(serde_json::Value::as_u64).unwrap_or(0).min(LARGEST_NUMBER);
+        let last = rows.last().map_or(0, |row| row.number).max(last);
+        let problem = (missing > 0).then(|| format!("“runs” has {missing} rows that cannot be read"));
+        Ok((Self { last, rows }, problem))
+    }
+
+    /// Whether a row is the same run as one of `other`, whatever has been noted on it since.
+    fn has(&self, row: &Run) -> bool {
+        self.row(row.number).is_some_and(|here| {
+            (here.unix_s, &here.sources, &here.title) == (row.unix_s, &row.sources, &row.title)
+        })
+    }
+
+    /// How many rows there are that `other` has not.
+    pub(crate) fn missing_in(&self, other: &Self) -> usize {
+        self.rows.iter().filter(|row| !other.has(row)).count()
+    }
+
+    /// Rows that are in `before` too keep their curves.
+    pub(super) fn take_series(&mut self, before: &Self) {
+        for row in &mut self.rows {
+            let here = before.row(row.number).filter(|_| before.has(row));
+            if let Some(series) = here.and_then(|here| here.series.clone()) {
+                Arc::make_mut(row).series = Some(series);
+            }
+        }
     }
 
     /// Takes a row out.
     pub(super) fn remove(&mut self, number: u64) -> Option<Run> {
         let index = self.rows.iter().position(|run| run.number == number)?;
-        Some(self.rows.remove(index))
+        Some(Arc::unwrap_or_clone(self.rows.remove(index)))
     }
 
     /// Puts a row back to where its number belongs.
     pub(super) fn put_back(&mut self, run: Run) {
         let index = self.rows.partition_point(|row| row.number < run.number);
-        self.rows.insert(index, run);
+        self.rows.insert(index, Arc::new(run));
         self.forget_old_series();
     }
 }
@@ -250,6 +282,21 @@ pub(crate) fn differences(old: &Run, new: &Run) -> Vec<Difference> {
         (old != new).then(|| Difference { key: key.clone(), old: old.cloned(), new: new.cloned() })
     };
     keys.into_iter().filter_map(difference).collect()
+}
+
+/// Hash of a model's text and of logs' columns. Long logs take their time: made on the thread that reads them.
+#[derive(Clone, Debug)]
+pub(crate) struct Sources(String);
+
+impl Sources {
+    pub(crate) fn new<'a>(model: Option<&Model>, logs: impl IntoIterator<Item = &'a Log>) -> Self {
+        let mut hash = Hash::new();
+        if let Some(model) = model {
+            hash.text(&model.to_toml());
+        }
+        logs.into_iter().for_each(|log| hash.log(log));
+        Self(hash.hex())
+    }
 }
 
 /// A 64-bit hash that is the same on all machines: FNV-1a over bytes, and over numbers as words.
@@ -295,7 +342,10 @@ mod tests {
     use super::*;
 
     fn run(number: u64, model: &Model) -> Run {
-        Run { number, ..Run::new(RunKind::Experiment, "flat, LQR", Some(model), &[]) }
+        Run {
+            number,
+            ..Run::new(RunKind::Experiment, "flat, LQR", Some(model), Sources::new(Some(model), []))
+        }
     }
 
     #[test]
@@ -321,14 +371,15 @@ mod tests {
         ledger.add(run(0, &presets::paper()), 1_700_000_002);
         ledger.remove(3).unwrap();
         let value: serde_json::Value = serde_json::from_str(&ledger.to_value().to_string()).unwrap();
-        let mut read = Ledger::default();
-        read.take_value(&value).unwrap();
-        assert_eq!(read.rows()[0], Run { series: None, ..ledger.rows()[0].clone() });
+        let (mut read, problem) = Ledger::from_value(&value).unwrap();
+        assert_eq!(problem, None);
+        assert_eq!(*read.rows()[0], Run { series: None, ..(*ledger.rows()[0]).clone() });
         assert_eq!(read.rows()[1], ledger.rows()[1]);
         assert_eq!(value["rows"][0]["made_with"]["robot.body_mass_kg"], 13.0);
         assert_eq!(read.add(run(0, &presets::paper()), 8), 4, "3 was given");
-        ledger.take_value(&value).unwrap();
-        assert!(ledger.rows()[0].series.is_some(), "rows that are here keep their curves");
+        read.take_series(&ledger);
+        assert!(read.rows()[0].series.is_some(), "rows that were here keep their curves");
+        assert_eq!((read.missing_in(&ledger), ledger.missing_in(&read)), (1, 0));
     }
 
     #[test]
@@ -340,13 +391,33 @@ mod tests {
         let mut value = ledger.to_value();
         value["rows"][1]["kind"] = "dance".into();
         value["last"] = "many".into();
-        let mut read = Ledger::default();
-        assert_eq!(read.take_value(&value), Err("“runs” has 1 rows that cannot be read".to_owned()));
+        let (mut read, problem) = Ledger::from_value(&value).unwrap();
+        assert_eq!(problem.as_deref(), Some("“runs” has 1 rows that cannot be read"));
         assert_eq!(read.rows().iter().map(|run| run.number).collect::<Vec<_>>(), [1, 3]);
         assert_eq!(read.add(run(0, &presets::paper()), 8), 4);
         for no_ledger in [serde_json::json!([]), serde_json::json!({ "rows": 3 })] {
-            assert!(read.take_value(&no_ledger).is_err());
-            assert_eq!(read.rows().len(), 3, "what is there stays");
+            assert!(Ledger::from_value(&no_ledger).is_err());
+        }
+    }
+
+    #[test]
+    fn no_number_of_a_file_is_so_large_that_the_next_one_fails() {
+        let mut ledger = Ledger::default();
+        ledger.add(run(0, &presets::paper()), 7);
+        for (last, number, rows) in [
+            (u64::MAX, 1, 1),
+            (0, u64::MAX, 0),
+            (LARGEST_NUMBER + 1, LARGEST_NUMBER, 1),
+            (3, LARGEST_NUMBER + 1, 0),
+        ] {
+            let mut value = ledger.to_value();
+            value["last"] = last.into();
+            value["rows"][0]["number"] = number.into();
+            let (mut read, problem) = Ledger::from_value(&value).unwrap();
+            assert_eq!((read.rows().len(), problem.is_some()), (rows, rows == 0), "{last} {number}");
+            let next = read.add(run(0, &presets::paper()), 8);
+            assert!(next > number.min(LARGEST_NUMBER) * rows as u64, "{last} {number}: {next}");
+            assert_eq!(read.row(next).map(|run| run.unix_s), Some(8));
         }
     }
 
@@ -377,12 +448,12 @@ mod tests {
             log.columns.push(Column { name: "time_s".to_owned(), values: vec![0.0, value] });
             log
         };
-        let of = |value| Run::new(RunKind::Fit, "fit", None, &[&log(value)]).sources;
+        let of = |value| Sources::new(None, [&log(value)]).0;
         assert_eq!(of(1.0), of(1.0));
         assert_ne!(of(1.0), of(1.0 + f64::EPSILON));
         assert_ne!(of(1.0), of(-1.0));
         // FNV-1a's own offset: nothing was hashed.
-        assert_eq!(Run::new(RunKind::Fit, "fit", None, &[]).sources, "cbf29ce484222325");
+        assert_eq!(Sources::new(None, []).0, "cbf29ce484222325");
     }
 
     #[test]

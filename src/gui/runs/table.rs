@@ -36,7 +36,8 @@ impl RunTable {
         ui: &mut Ui,
     ) {
         section_ui(ui, "Runs", |ui| self.head_ui(context, ledger, ticked, can_undo, ui));
-        let found: Vec<&Run> = ledger.rows().iter().rev().filter(|run| self.finds(run)).collect();
+        let found: Vec<&Run> =
+            ledger.rows().iter().rev().map(|run| &**run).filter(|run| self.finds(run)).collect();
         if found.is_empty() {
             hint_ui(ui, "No row has these words in it.");
         }
@@ -199,14 +200,19 @@ fn as_text(ledger: &Ledger) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::run::RunKind;
+    use super::super::run::{RunKind, Sources};
     use super::*;
 
     #[test]
     fn rows_as_text_keep_their_columns_whatever_is_noted() {
         let mut ledger = Ledger::default();
-        ledger
-            .add(Run { note: "a\tb\nc".to_owned(), ..Run::new(RunKind::Fit, "friction", None, &[]) }, 86_399);
+        ledger.add(
+            Run {
+                note: "a\tb\nc".to_owned(),
+                ..Run::new(RunKind::Fit, "friction", None, Sources::new(None, []))
+            },
+            86_399,
+        );
         let text = as_text(&ledger);
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(lines.len(), 2);

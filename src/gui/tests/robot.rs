@@ -7,10 +7,12 @@ mod common;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use common::{SIZE, TempFile, Window, click, enter, next, open, options, random_input, state, until};
+use common::{
+    SIZE, TempFile, Window, click, command, enter, next, open, options, random_input, state, until,
+};
 use egui::accesskit::Role;
 use egui::{Event as Input, Key, Modifiers, Vec2, vec2};
-use egui_kittest::kittest::Queryable;
+use egui_kittest::{Node, kittest::Queryable};
 use flqr_core::control::drive::{Check, CheckResult, DriveOrder, Excitation, Stage, StopReason};
 use flqr_core::device::{
     Advice, CanInterface, Connection, Counters, DriveStatus, Event, EventKind, ImuStatus, Interfaces,
@@ -438,24 +440,25 @@ fn stop_is_in_reach_on_every_tab_and_its_reason_is_shown() {
 
 #[test]
 fn stop_is_in_reach_of_the_mouse_behind_the_palette_and_a_question() {
-    let script = Script::default();
-    let mut window = drive_window(&script);
-    window.key_press_modifiers(Modifiers::COMMAND, Key::K);
-    window.run_steps(3);
-    arm_by_orders(&mut window, &script);
-    window.run_steps(2);
-    assert!(window.query_by_label("command").is_none(), "the palette closes by itself");
     for steps in [false, true] {
+        let script = Script::default();
+        let mut window = drive_window(&script);
         window.key_press_modifiers(Modifiers::COMMAND, Key::K);
         window.run_steps(3);
+        arm_by_orders(&mut window, &script);
+        window.run_steps(2);
+        assert!(window.query_by_label("command").is_none(), "the palette closes by itself");
         if steps {
-            window.event(Input::Text("steps".to_owned()));
-            window.run_steps(2);
-            window.key_press(Key::Enter);
-            window.run_steps(4);
+            command(&mut window, "steps");
             assert_eq!(state(&window)["question"], "steps");
+        } else {
+            window.key_press_modifiers(Modifiers::COMMAND, Key::K);
+            window.run_steps(3);
         }
-        window.get_all_by_label("STOP").last().unwrap().click();
+        // The one in the middle of the window; the strip's is behind the palette or the question.
+        let from_middle = |stop: &Node<'_>| (stop.rect().center().x - 0.5 * SIZE.x).abs();
+        let nearest = |a: &Node<'_>, b: &Node<'_>| from_middle(a).total_cmp(&from_middle(b));
+        window.get_all_by_label("STOP").min_by(nearest).unwrap().click();
         window.run_steps(3);
         assert_eq!(script.drive_orders(), [DriveOrder::Stop], "a question: {steps}");
     }

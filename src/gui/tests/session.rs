@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use common::{ROBOT, SIZE, TempFile, Window, click, command, enter, open, options, state, until};
-use egui::{Key, Modifiers, ViewportCommand, ViewportEvent, ViewportId, vec2};
+use egui::{Event, Key, Modifiers, ViewportCommand, ViewportEvent, ViewportId, vec2};
 use egui_kittest::kittest::Queryable;
 use flqr_core::model_file::Model;
 use flqr_gui::{Tab, WindowOptions};
@@ -179,8 +179,46 @@ fn starting_afresh_leaves_the_kept_session_in_its_file() {
     until(&mut window, "the question", |s| s["question"] == "replace");
     assert_eq!(pitch_weight(&window), 5.0);
     window.run_steps(2);
-    click(&mut window, "Replace the model");
+    click(&mut window, "Replace it");
     until(&mut window, "opening", |s| s["q_diagonal"][2] == 322.0);
+}
+
+#[test]
+fn runs_are_replaced_by_those_of_a_file_after_a_question_and_come_back_by_undo() {
+    let folder = Folder::new("runs");
+    let row = |number: u64, title: &str| {
+        json!({
+            "number": number, "unix_s": 7, "kind": "fit", "title": title, "seed": 1, "sources": "0",
+            "made_with": {}, "result": "", "note": "",
+        })
+    };
+    let file = |name: &str, rows: Value| {
+        let value = json!({
+            "format": "flqr-session", "version": 1, "runs": { "last": u64::MAX, "rows": rows },
+        });
+        std::fs::write(folder.0.join(name), value.to_string()).unwrap();
+    };
+    file("last.flqr-session", json!([row(1, "first"), row(2, "second")]));
+    file("other.flqr-session", json!([row(1, "other")]));
+    let titles = |window: &Window| {
+        let rows = state(window)["runs_tab"]["rows"].as_array().unwrap().clone();
+        rows.iter().map(|row| row["title"].as_str().unwrap().to_owned()).collect::<Vec<_>>()
+    };
+    let mut window = open(folder.options(), SIZE);
+    until(&mut window, "the rows of before", |s| s["runs_tab"]["rows"].as_array().unwrap().len() == 2);
+    for (answer, expected) in [(Key::K, ["first", "second"].as_slice()), (Key::R, &["other"])] {
+        command(&mut window, "open a session");
+        enter(&mut window, "path of the file", folder.0.join("other.flqr-session").to_str().unwrap());
+        until(&mut window, "the question", |s| s["question"] == "replace");
+        window.run_steps(2);
+        window.get_by_label_contains("2 rows of the Runs page");
+        keys(&mut window, Modifiers::NONE, answer);
+        assert_eq!(titles(&window), expected);
+    }
+    keys(&mut window, Modifiers::COMMAND, Key::Z);
+    assert_eq!(titles(&window), ["first", "second"]);
+    keys(&mut window, Modifiers::COMMAND, Key::Y);
+    assert_eq!(titles(&window), ["other"]);
 }
 
 #[test]
@@ -272,6 +310,42 @@ fn closing_asks_only_where_changes_would_be_lost() {
     enter(&mut window, "pitch weight", "250");
     assert!(!closes(&mut window));
     click(&mut window, "Discard and close");
+    assert_eq!(state(&window)["leaving"], true);
+    assert!(closes(&mut window));
+}
+
+#[test]
+fn a_letter_answers_a_question_and_the_focused_answer_is_told() {
+    let mut window = open(options(Tab::Tune), SIZE);
+    enter(&mut window, "pitch weight", "250");
+    let ask = |window: &mut Window| {
+        assert!(!closes(window));
+        assert_eq!(state(window)["question"], "leave");
+        assert!(state(window)["question_focus"].is_null());
+    };
+    ask(&mut window);
+    for name in ["Save and close", "Discard and close", "Cancel"] {
+        keys(&mut window, Modifiers::NONE, Key::Tab);
+        assert_eq!(state(&window)["question_focus"], name);
+    }
+    keys(&mut window, Modifiers::NONE, Key::C);
+    assert!(state(&window)["question"].is_null() && state(&window)["question_focus"].is_null());
+    assert_eq!(pitch_weight(&window), 250.0);
+
+    // A field behind the question must not hold the letters back.
+    window.get_by_label("pitch weight").click();
+    window.run_steps(2);
+    ask(&mut window);
+    keys(&mut window, Modifiers::NONE, Key::S);
+    assert_eq!(state(&window)["question"], "path", "the model has no file yet");
+    window.event(Event::Text("close".to_owned()));
+    keys(&mut window, Modifiers::NONE, Key::C);
+    assert_eq!(state(&window)["question"], "path", "letters of a path are no answers");
+    keys(&mut window, Modifiers::NONE, Key::Escape);
+    assert!(state(&window)["question"].is_null());
+
+    ask(&mut window);
+    keys(&mut window, Modifiers::NONE, Key::D);
     assert_eq!(state(&window)["leaving"], true);
     assert!(closes(&mut window));
 }

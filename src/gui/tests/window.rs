@@ -472,6 +472,14 @@ fn a_model_is_saved_and_loaded_back() {
     until(&mut window, "saving", |s| s["unsaved_changes"] == false);
     enter(&mut window, "velocity weight", "5");
     click(&mut window, "Load");
+    until(&mut window, "the question", |s| s["question"] == "replace");
+    window.run_steps(2);
+    click(&mut window, "Keep it");
+    assert_eq!(state(&window)["q_diagonal"][1], 5.0);
+    click(&mut window, "Load");
+    until(&mut window, "the question", |s| s["question"] == "replace");
+    window.run_steps(2);
+    click(&mut window, "Replace it");
     until(&mut window, "loading", |s| s["q_diagonal"][1] == 77.0);
 }
 
