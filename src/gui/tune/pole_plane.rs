@@ -1,14 +1,17 @@
 //! Poles of the loop as it runs, on the plane of s or of z, with lines of equal damping and rings of equal frequency.
 
-use egui::{Color32, Pos2, Stroke, Ui, Vec2};
+use egui::{Color32, Pos2, Response, Stroke, Ui, Vec2};
 use egui_plot::{Line, LineStyle, MarkerShape, PlotBounds, PlotPoints, PlotTransform, PlotUi, Points, Text};
-use flqr_core::lqr::SampledPole;
+use flqr_core::lqr::{NoWeights, SampledPole, Weights, weights_for_pole};
+use flqr_core::report::capitalised;
+use nalgebra::Complex;
 
 use super::margins::complex;
 use super::predicted::quiet_plot;
+use crate::command::Command;
 use crate::context::ViewContext;
 use crate::theme::palette;
-use crate::widgets::{choice_ui, shown};
+use crate::widgets::{choice_ui, shown, warning_ui};
 
 /// Dampings that are drawn as lines.
 const DAMPINGS: [f64; 4] = [0.3, 0.5, 0.7, 0.9];
@@ -33,10 +36,22 @@ enum Plane {
     Z,
 }
 
+/// A pole in the user's hand.
+struct Drag {
+    /// Weights and place of the pole when it was taken.
+    start: Weights,
+    from: Complex<f64>,
+    /// The view, which rests until the pole is let go.
+    bounds: PlotBounds,
+    /// Why it does not follow, while it doesn't.
+    refused: Option<NoWeights>,
+}
+
 /// What is chosen.
 #[derive(Default)]
 pub(super) struct PolePlane {
     plane: Plane,
+    drag: Option<Drag>,
 }
 
 impl PolePlane {
@@ -50,7 +65,7 @@ impl PolePlane {
 
     /// Draws the poles of the design in force and of the other one.
     pub(super) fn ui(
-        &self,
+        &mut self,
         context: &ViewContext<'_>,
         (now, other): (&[SampledPole], &[SampledPole]),
         ui: &mut Ui,
@@ -71,6 +86,7 @@ impl PolePlane {
                 PlotBounds::from_min_max([-half, -1.15], [half, 1.15])
             }
         };
+        let bounds = self.drag.as_ref().map_or(bounds, |drag| drag.bounds);
         let plot = quiet_plot(ui, size, x_label, y_label).show_grid(false);
         let shown = plot.show(ui, |plot_ui| {
             plot_ui.set_plot_bounds(bounds);
@@ -87,13 +103,67 @@ impl PolePlane {
         let named = !other.is_empty();
         let nearest =
             shown.response.hover_pos().and_then(|pointer| self.nearest(&shown.transform, all, pointer));
+        let nearest = nearest.map(|(name, pole)| (name, *pole));
+        self.drag_ui(context, now, &shown.response, &shown.transform);
+        let refused = self.drag.as_ref().and_then(|drag| drag.refused);
         shown.response.on_hover_ui_at_pointer(|ui| {
+            if let Some(refused) = refused {
+                warning_ui(ui, format!("{}.", capitalised(&refused.to_string())));
+                return;
+            }
             ui.label(match nearest {
-                Some((name, pole)) => told(name, pole, named),
-                None => "Poles of the loop as it runs, with its delay and held IMU. Rays: damping; rings: frequency. Point at a pole to read it."
+                Some((name, pole)) => told(name, &pole, named),
+                None => "Poles of the loop as it runs, with its delay and held IMU. Rays: damping; rings: frequency. Point at a pole to read it, drag it to another place and the weights follow."
                     .to_owned(),
             });
         });
+    }
+
+    /// A dragged pole takes the weights with it, as far as there are weights for its place.
+    fn drag_ui(
+        &mut self,
+        context: &ViewContext<'_>,
+        now: &[SampledPole],
+        response: &Response,
+        transform: &PlotTransform,
+    ) {
+        if self.plane != Plane::S {
+            return;
+        }
+        if response.drag_started()
+            && let Some(pressed) = response.ctx.input(|input| input.pointer.press_origin())
+        {
+            let plants = now.iter().take(PLANTS).map(|pole| ("", pole));
+            let taken = self.nearest(transform, plants, pressed);
+            let bounds = *transform.bounds();
+            let start = context.session.weights();
+            self.drag = taken.map(|(_, pole)| Drag { start, from: pole.s, bounds, refused: None });
+        }
+        if let (Some(pointer), true) = (response.interact_pointer_pos(), response.dragged()) {
+            let at = transform.value_from_position(pointer);
+            self.follow(context, Complex::new(at.x, at.y));
+        }
+        if response.drag_stopped()
+            && let Some(Drag { refused: Some(refused), .. }) = self.drag.take()
+        {
+            context.commands.send(Command::Say(format!("{}.", capitalised(&refused.to_string()))));
+        }
+    }
+
+    fn follow(&mut self, context: &ViewContext<'_>, at: Complex<f64>) {
+        let (Some(drag), Some(designed)) = (&mut self.drag, context.designer.in_force) else { return };
+        // A pole stays on its side of the real axis, where its other half is its mirror image.
+        let at = Complex::new(at.re, if drag.from.im < 0.0 { at.im.min(0.0) } else { at.im.max(0.0) });
+        let model = designed.parameters.linear_model();
+        let found = weights_for_pole(&model, &designed.timing, &drag.start, drag.from, at);
+        drag.refused = found.err();
+        let mut weights = found.unwrap_or_else(|refused| refused.weights);
+        for state in 0..4 {
+            weights.set_state_weight(state, rounded(weights.q[(state, state)]));
+        }
+        if weights != context.session.weights() {
+            context.commands.send(Command::SetWeights(weights));
+        }
     }
 
     fn place(&self, pole: &SampledPole) -> [f64; 2] {
@@ -130,6 +200,11 @@ impl PolePlane {
             .min_by(|a, b| a.0.total_cmp(&b.0))
             .map(|(_, name, pole)| (name, pole))
     }
+}
+
+/// To three digits, as people write weights.
+fn rounded(weight: f64) -> f64 {
+    format!("{weight:.2e}").parse().unwrap_or(weight)
 }
 
 fn told(name: &str, pole: &SampledPole, named: bool) -> String {

@@ -127,7 +127,11 @@ impl Predicted {
                 self.response_plot(context, *what, limit_nm, ui, size);
             }
             let size = vec2(ui.available_width(), ui.available_height());
-            self.plane.ui(context, (&self.now.poles, &self.other.poles), ui, size);
+            // With an id of its own, or a drag would end where a plot before it gets more parts.
+            let scope = egui::UiBuilder::new().scope_id(egui::Id::unique("plane of poles"));
+            ui.scope_builder(scope, |ui| {
+                self.plane.ui(context, (&self.now.poles, &self.other.poles), ui, size);
+            });
         });
     }
 

@@ -121,7 +121,7 @@ impl WeightEditor {
 
     fn row_ui(&self, ui: &mut Ui, row: &Row, (weight, saved): (&mut f64, f64), focus: bool) {
         ui.label(row.name).on_hover_text(row.help);
-        ui.spacing_mut().slider_width = 58.0;
+        ui.spacing_mut().slider_width = 52.0;
         let slider = Slider::new(weight, SMALLEST..=LARGEST)
             .logarithmic(true)
             .smallest_positive(SMALLEST)
@@ -132,7 +132,7 @@ impl WeightEditor {
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 2.0;
             self.step_ui(ui, row, weight, Step::Down);
-            let field = number_ui(ui, weight, &format!("{} weight", row.name), 52.0);
+            let field = number_ui(ui, weight, &format!("{} weight", row.name), 64.0);
             if focus {
                 field.request_focus();
             }
@@ -189,7 +189,7 @@ fn deviation_ui(ui: &mut Ui, row: &Row, weight: &mut f64) {
             return;
         }
         let mut deviation = before;
-        let field = number_ui(ui, &mut deviation, &format!("{} deviation", row.name), 46.0);
+        let field = number_ui(ui, &mut deviation, &format!("{} deviation", row.name), 52.0);
         field.on_hover_text(format!(
             "The deviation of {} that counts as 1: weight = 1/deviation², in SI units",
             row.name

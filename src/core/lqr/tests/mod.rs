@@ -4,6 +4,7 @@ mod care;
 mod carex;
 mod design;
 mod margins;
+mod placement;
 mod running;
 
 use nalgebra::DMatrix;

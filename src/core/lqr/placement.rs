@@ -1,0 +1,140 @@
+//! Weights that put a pole where it is wanted: the least change of Q's diagonal that does it, if there is one.
+
+use nalgebra::{Complex, SMatrix, Vector2, Vector4};
+
+use super::design::design;
+use super::margins::SampledLoop;
+use super::running::{SampledPole, sampled_poles};
+use super::weights::Weights;
+use crate::robot::LinearModel;
+
+/// In how many parts the way is walked: where a way of few parts is lost, one of more is tried.
+const PARTS: [usize; 4] = [1, 3, 9, 27];
+const NEWTON_STEPS: usize = 8;
+/// Distance that counts as reached, relative to the pole's size.
+const REACHED: f64 = 1e-3;
+/// Range of Q's diagonal, SI.
+const SMALLEST: f64 = 1e-6;
+const LARGEST: f64 = 1e8;
+/// Change of a weight's logarithm for a derivative.
+const STEP: f64 = 1e-4;
+/// Longest step of a weight's logarithm: a factor of 3.
+const LONGEST: f64 = 1.1;
+/// Imaginary part, relative to the pole's size, below which it counts as real.
+const REAL: f64 = 1e-6;
+
+/// Why no weights were found.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("no diagonal of q from 1e-6 to 1e8 puts the pole there: it comes as near as {:.3} + {:.3}i", nearest.re, nearest.im)]
+pub struct NoWeights {
+    /// The last pole on the way there that weights were found for, 1/s.
+    pub nearest: Complex<f64>,
+    /// Those weights.
+    pub weights: Weights,
+}
+
+/// Weights with R and the correlations of `start` whose loop, as it runs, has its pole `from` at `to`, 1/s; a real
+/// pole stays real, and no pole passes the imaginary axis that was left of it. Of all that do, those next to `start` in the logarithms of Q's diagonal, about: Newton's method
+/// along the line from one to the other.
+///
+/// # Errors
+/// [`NoWeights`] where the line leaves what weights can do.
+pub fn weights_for_pole(
+    model: &LinearModel,
+    timing: &SampledLoop,
+    start: &Weights,
+    from: Complex<f64>,
+    to: Complex<f64>,
+) -> Result<Weights, NoWeights> {
+    let is_real = from.im.abs() < REAL * from.norm();
+    let to = if is_real { Complex::new(to.re, 0.0) } else { to };
+    let mut search = Search { model, timing, start, rightmost: f64::INFINITY };
+    let logarithms = Vector4::from_fn(|state, _| start.q[(state, state)].clamp(SMALLEST, LARGEST).ln());
+    search.rightmost = rightmost(&search.poles(&logarithms).unwrap_or_default()).max(0.0);
+    let mut lost = (logarithms, from);
+    for parts in PARTS {
+        match search.walk(logarithms, from, to, parts) {
+            Ok(found) => return Ok(search.weights(&found)),
+            Err(nearest) => lost = nearest,
+        }
+    }
+    Err(NoWeights { nearest: lost.1, weights: search.weights(&lost.0) })
+}
+
+struct Search<'a> {
+    model: &'a LinearModel,
+    timing: &'a SampledLoop,
+    start: &'a Weights,
+    /// How far to the right a pole may be, 1/s.
+    rightmost: f64,
+}
+
+fn rightmost(poles: &[SampledPole]) -> f64 {
+    poles.iter().map(|pole| pole.s.re).fold(f64::NEG_INFINITY, f64::max)
+}
+
+impl Search<'_> {
+    fn weights(&self, logarithms: &Vector4<f64>) -> Weights {
+        let mut weights = *self.start;
+        for state in 0..4 {
+            weights.set_state_weight(state, logarithms[state].exp());
+        }
+        weights
+    }
+
+    fn poles(&self, logarithms: &Vector4<f64>) -> Option<Vec<SampledPole>> {
+        let gain = design(self.model, &self.weights(logarithms)).ok()?.gain;
+        Some(sampled_poles(self.model, &gain, self.timing))
+    }
+
+    /// The pole next to `near`, where none is too far to the right.
+    fn pole(&self, logarithms: &Vector4<f64>, near: Complex<f64>) -> Option<Complex<f64>> {
+        let poles = self.poles(logarithms).filter(|poles| rightmost(poles) <= self.rightmost)?;
+        let distance = |pole: &Complex<f64>| (pole - near).norm();
+        poles.into_iter().map(|pole| pole.s).min_by(|a, b| distance(a).total_cmp(&distance(b)))
+    }
+
+    /// Weights along the line between two places of a pole, in equal parts; how far it came where they end.
+    fn walk(
+        &self,
+        mut logarithms: Vector4<f64>,
+        from: Complex<f64>,
+        to: Complex<f64>,
+        parts: usize,
+    ) -> Result<Vector4<f64>, (Vector4<f64>, Complex<f64>)> {
+        let mut pole = from;
+        for part in 1..=parts {
+            let wanted = from + (to - from) * (part as f64 / parts as f64);
+            (logarithms, pole) = self.newton(logarithms, pole, wanted).ok_or((logarithms, pole))?;
+        }
+        Ok(logarithms)
+    }
+
+    /// Weights whose pole next to `pole` is at `wanted`, by steps of least length.
+    fn newton(
+        &self,
+        mut logarithms: Vector4<f64>,
+        mut pole: Complex<f64>,
+        wanted: Complex<f64>,
+    ) -> Option<(Vector4<f64>, Complex<f64>)> {
+        for _ in 0..NEWTON_STEPS {
+            pole = self.pole(&logarithms, pole)?;
+            let error = wanted - pole;
+            if error.norm() <= REACHED * wanted.norm() {
+                return Some((logarithms, pole));
+            }
+            let mut slope = SMatrix::<f64, 2, 4>::zeros();
+            for state in 0..4 {
+                let mut beside = logarithms;
+                beside[state] += STEP;
+                let change = (self.pole(&beside, pole)? - pole) / STEP;
+                slope.set_column(state, &Vector2::new(change.re, change.im));
+            }
+            let inverse = slope.pseudo_inverse(1e-9 * slope.norm()).ok()?;
+            let step: Vector4<f64> = inverse * Vector2::new(error.re, error.im);
+            logarithms += step * (LONGEST / step.amax()).min(1.0);
+            logarithms = logarithms.map(|value| value.clamp(SMALLEST.ln(), LARGEST.ln()));
+        }
+        None
+    }
+}
