@@ -29,6 +29,6 @@ pub use design::{LqrDesign, design};
 pub use disturbance::Disturbance;
 pub use error::{CareError, DesignError};
 pub use margins::{Margins, SampledLoop, margins};
-pub use placement::{NoWeights, weights_for_pole};
+pub use placement::{Placement, weights_for_pole};
 pub use running::{SampledPole, SampledResponse, damping, sampled_poles, sampled_response};
 pub use weights::Weights;

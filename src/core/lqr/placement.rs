@@ -23,43 +23,47 @@ const LONGEST: f64 = 1.1;
 /// Imaginary part, relative to the pole's size, below which it counts as real.
 const REAL: f64 = 1e-6;
 
-/// Why no weights were found.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("no diagonal of q from 1e-6 to 1e8 puts the pole there: it comes as near as {:.3} + {:.3}i", nearest.re, nearest.im)]
-pub struct NoWeights {
-    /// The last pole on the way there that weights were found for, 1/s.
-    pub nearest: Complex<f64>,
-    /// Those weights.
+/// How far weights can take a pole.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Placement {
+    /// Those that take it there, or as far as the way goes.
     pub weights: Weights,
+    /// Where the pole is with them, 1/s.
+    pub pole: Complex<f64>,
+    /// Whether that is where it was wanted.
+    pub is_reached: bool,
 }
 
 /// Weights with R and the correlations of `start` whose loop, as it runs, has its pole `from` at `to`, 1/s; a real
 /// pole stays real, and no pole passes the imaginary axis that was left of it. Of all that do, those next to `start` in the logarithms of Q's diagonal, about: Newton's method
-/// along the line from one to the other.
-///
-/// # Errors
-/// [`NoWeights`] where the line leaves what weights can do.
+/// along the line from one to the other. Where the line leaves what diagonals of Q from 1e-6 to 1e8 can do, they are
+/// those of its last place.
 pub fn weights_for_pole(
     model: &LinearModel,
     timing: &SampledLoop,
     start: &Weights,
     from: Complex<f64>,
     to: Complex<f64>,
-) -> Result<Weights, NoWeights> {
+) -> Placement {
     let is_real = from.im.abs() < REAL * from.norm();
     let to = if is_real { Complex::new(to.re, 0.0) } else { to };
     let mut search = Search { model, timing, start, rightmost: f64::INFINITY };
     let logarithms = Vector4::from_fn(|state, _| start.q[(state, state)].clamp(SMALLEST, LARGEST).ln());
     search.rightmost = rightmost(&search.poles(&logarithms).unwrap_or_default()).max(0.0);
-    let mut lost = (logarithms, from);
+    let mut farthest = (logarithms, from);
     for parts in PARTS {
         match search.walk(logarithms, from, to, parts) {
-            Ok(found) => return Ok(search.weights(&found)),
-            Err(nearest) => lost = nearest,
+            Ok((found, pole)) => {
+                return Placement { weights: search.weights(&found), pole, is_reached: true };
+            }
+            Err(lost) => farthest = lost,
         }
     }
-    Err(NoWeights { nearest: lost.1, weights: search.weights(&lost.0) })
+    Placement { weights: search.weights(&farthest.0), pole: farthest.1, is_reached: false }
 }
+
+/// Logarithms of Q's diagonal, and where a pole is with them.
+type Place = (Vector4<f64>, Complex<f64>);
 
 struct Search<'a> {
     model: &'a LinearModel,
@@ -101,13 +105,13 @@ impl Search<'_> {
         from: Complex<f64>,
         to: Complex<f64>,
         parts: usize,
-    ) -> Result<Vector4<f64>, (Vector4<f64>, Complex<f64>)> {
+    ) -> Result<Place, Place> {
         let mut pole = from;
         for part in 1..=parts {
             let wanted = from + (to - from) * (part as f64 / parts as f64);
             (logarithms, pole) = self.newton(logarithms, pole, wanted).ok_or((logarithms, pole))?;
         }
-        Ok(logarithms)
+        Ok((logarithms, pole))
     }
 
     /// Weights whose pole next to `pole` is at `wanted`, by steps of least length.
@@ -116,7 +120,7 @@ impl Search<'_> {
         mut logarithms: Vector4<f64>,
         mut pole: Complex<f64>,
         wanted: Complex<f64>,
-    ) -> Option<(Vector4<f64>, Complex<f64>)> {
+    ) -> Option<Place> {
         for _ in 0..NEWTON_STEPS {
             pole = self.pole(&logarithms, pole)?;
             let error = wanted - pole;

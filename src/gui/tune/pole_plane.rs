@@ -2,8 +2,7 @@
 
 use egui::{Color32, Pos2, Response, Stroke, Ui, Vec2};
 use egui_plot::{Line, LineStyle, MarkerShape, PlotBounds, PlotPoints, PlotTransform, PlotUi, Points, Text};
-use flqr_core::lqr::{NoWeights, SampledPole, Weights, weights_for_pole};
-use flqr_core::report::capitalised;
+use flqr_core::lqr::{SampledPole, Weights, weights_for_pole};
 use nalgebra::Complex;
 
 use super::margins::complex;
@@ -43,8 +42,8 @@ struct Drag {
     from: Complex<f64>,
     /// The view, which rests until the pole is let go.
     bounds: PlotBounds,
-    /// Why it does not follow, while it doesn't.
-    refused: Option<NoWeights>,
+    /// How near it comes, while no weights take it to the pointer.
+    refused: Option<Complex<f64>>,
 }
 
 /// What is chosen.
@@ -108,7 +107,7 @@ impl PolePlane {
         let refused = self.drag.as_ref().and_then(|drag| drag.refused);
         shown.response.on_hover_ui_at_pointer(|ui| {
             if let Some(refused) = refused {
-                warning_ui(ui, format!("{}.", capitalised(&refused.to_string())));
+                warning_ui(ui, refused_text(refused));
                 return;
             }
             ui.label(match nearest {
@@ -146,7 +145,7 @@ impl PolePlane {
         if response.drag_stopped()
             && let Some(Drag { refused: Some(refused), .. }) = self.drag.take()
         {
-            context.commands.send(Command::Say(format!("{}.", capitalised(&refused.to_string()))));
+            context.commands.send(Command::Say(refused_text(refused)));
         }
     }
 
@@ -155,9 +154,9 @@ impl PolePlane {
         // A pole stays on its side of the real axis, where its other half is its mirror image.
         let at = Complex::new(at.re, if drag.from.im < 0.0 { at.im.min(0.0) } else { at.im.max(0.0) });
         let model = designed.parameters.linear_model();
-        let found = weights_for_pole(&model, &designed.timing, &drag.start, drag.from, at);
-        drag.refused = found.err();
-        let mut weights = found.unwrap_or_else(|refused| refused.weights);
+        let placed = weights_for_pole(&model, &designed.timing, &drag.start, drag.from, at);
+        drag.refused = (!placed.is_reached).then_some(placed.pole);
+        let mut weights = placed.weights;
         for state in 0..4 {
             weights.set_state_weight(state, rounded(weights.q[(state, state)]));
         }
@@ -200,6 +199,10 @@ impl PolePlane {
             .min_by(|a, b| a.0.total_cmp(&b.0))
             .map(|(_, name, pole)| (name, pole))
     }
+}
+
+fn refused_text(nearest: Complex<f64>) -> String {
+    format!("No weights put the pole there: it comes as near as {} 1/s.", complex(nearest.re, nearest.im))
 }
 
 /// To three digits, as people write weights.
