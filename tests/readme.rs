@@ -60,3 +60,35 @@ fn every_link_within_leads_to_a_heading() {
         assert!(headings.contains(link), "#{link} is none of {headings:?}");
     }
 }
+
+#[test]
+fn every_linked_file_is_there() {
+    let text = readme();
+    let links: BTreeSet<&str> = text
+        .split("](")
+        .skip(1)
+        .filter_map(|rest| rest.split(')').next())
+        .filter(|link| !link.starts_with('#') && !link.contains("://"))
+        .collect();
+    assert!(links.contains("LICENSE"), "{links:?}");
+    for link in links {
+        assert!(Path::new(env!("CARGO_MANIFEST_DIR")).join(link).exists(), "{link}");
+    }
+}
+
+#[test]
+fn every_note_is_used_and_every_used_one_is_there() {
+    let text = readme();
+    let notes: BTreeSet<&str> = text
+        .lines()
+        .filter(|line| line.starts_with("[^"))
+        .filter_map(|line| line.split(']').next())
+        .collect();
+    let used: BTreeSet<&str> = text
+        .lines()
+        .filter(|line| !line.starts_with("[^"))
+        .flat_map(|line| line.match_indices("[^").filter_map(|(at, _)| line[at..].split(']').next()))
+        .collect();
+    assert!(!used.is_empty());
+    assert_eq!(notes, used);
+}
