@@ -14,48 +14,7 @@ binary=$(realpath "${1:?$usage}")
 mkdir -p "${2:?$usage}"
 out=$(realpath "$2")
 log=${3:+$(realpath "$3")}
-state="$out/state.json"
-size=1280x800
-
-started=()
-cleanup() {
-    for ((i = ${#started[@]} - 1; i >= 0; i--)); do
-        kill "${started[i]}" 2>/dev/null || true
-        wait "${started[i]}" 2>/dev/null || true
-    done
-    rm -rf "$scratch"
-}
-scratch=$(mktemp -d)
-trap cleanup EXIT
-
-fail() {
-    echo "window.sh: $*" >&2
-    [ -s "$state" ] && cat "$state" >&2
-    [ -s "$scratch/stderr" ] && cat "$scratch/stderr" >&2
-    import -window root "$out/failed.png" 2>/dev/null || true
-    exit 1
-}
-
-# until_state SECONDS WHAT JQ-CONDITION: waits until the condition holds of the state file.
-until_state() {
-    for ((i = 0; i < $1 * 10; i++)); do
-        jq -e "$3" "$state" >/dev/null 2>&1 && return
-        kill -0 "$program" 2>/dev/null || fail "the program ended before: $2"
-        sleep 0.1
-    done
-    fail "did not happen within $1 s: $2"
-}
-
-# picture NAME: a screenshot that is not blank.
-picture() {
-    xdotool mousemove 640 40
-    sleep 0.6
-    import -window root "$out/$1.png"
-    local colours
-    colours=$(identify -format %k "$out/$1.png")
-    [ "$colours" -ge 100 ] || fail "$1.png is blank: it has $colours colours"
-    echo "$1.png: $colours colours"
-}
+source "$(dirname "$0")/display.sh"
 
 # differ A B: the pictures differ in at least 500 pixels.
 differ() {
@@ -76,23 +35,8 @@ if [ -z "$log" ]; then
     }' >"$log"
 fi
 
-# A display number of our own; Xvfb reports the one that it found free.
-mkfifo "$scratch/display"
-exec {display_pipe}<>"$scratch/display"
-Xvfb -displayfd "$display_pipe" -screen 0 "${size}x24" -nolisten tcp >/dev/null 2>&1 &
-started+=($!)
-read -r -t 20 -u "$display_pipe" display || fail "Xvfb did not start"
-export DISPLAY=":$display"
-openbox >/dev/null 2>&1 &
-started+=($!)
-sleep 0.5
-
-rm -f "$state"
-LIBGL_ALWAYS_SOFTWARE=1 XDG_CONFIG_HOME="$scratch" XDG_STATE_HOME="$scratch" "$binary" --state-out "$state" 2>"$scratch/stderr" &
-program=$!
-started+=("$program")
-window=$(timeout 60 xdotool search --sync --onlyvisible --name '^flqr' | tail -1) || fail "no window appeared"
-xdotool windowactivate --sync "$window" windowmove "$window" 0 0 windowsize "$window" 1278 776
+open_display 1280x800
+open_window
 until_state 30 "the simulated robot runs" '.simulation.seconds >= 2'
 picture tune
 
@@ -172,22 +116,11 @@ until_state 10 "friction is beside tune" '.shown == ["tune", "friction"]'
 picture beside
 differ tune-light beside
 
-# start NAME: opens the window again; its title is flqr.
-start() {
-    rm -f "$state"
-    LIBGL_ALWAYS_SOFTWARE=1 XDG_CONFIG_HOME="$scratch" XDG_STATE_HOME="$scratch" "$binary" --state-out "$state" \
-        2>"$scratch/stderr" &
-    program=$!
-    started+=("$program")
-    window=$(timeout 60 xdotool search --sync --onlyvisible --name '^flqr' | tail -1) || fail "no window: $1"
-    xdotool windowactivate --sync "$window" windowmove "$window" 0 0 windowsize "$window" 1278 776
-}
-
 echo "coming back after a kill"
 sleep 2
 kill -9 "$program"
 wait "$program" 2>/dev/null || true
-start "after a kill"
+open_window
 until_state 30 "the session of before is offered" '.question == "restore"'
 picture restore
 xdotool key r
@@ -204,13 +137,7 @@ kill -0 "$program" 2>/dev/null && fail "the window did not close"
 wait "$program" || fail "the closed window ended with code $?"
 
 echo "watching an emulated robot"
-rm -f "$state"
-LIBGL_ALWAYS_SOFTWARE=1 XDG_CONFIG_HOME="$scratch" XDG_STATE_HOME="$scratch" "$binary" --tab robot --source emulated --state-out "$state" \
-    2>"$scratch/stderr" &
-program=$!
-started+=("$program")
-window=$(timeout 60 xdotool search --sync --onlyvisible --name '^flqr' | tail -1) || fail "no second window appeared"
-xdotool windowactivate --sync "$window" windowmove "$window" 0 0 windowsize "$window" 1278 776
+open_window --tab robot --source emulated
 until_state 30 "the robot is heard" '.robot_tab.connection == "connected" and .robot_tab.rows > 2000'
 picture robot
 xdotool key ctrl+Return
