@@ -7,7 +7,7 @@ mod shell;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use egui::{Context, Ui};
 use flqr_core::control::ControllerKind;
@@ -23,6 +23,7 @@ use crate::design::Designer;
 use crate::dialog::{Answer, Dialog};
 use crate::document::{Base, Content, Opened, Store, Undo};
 use crate::experiments::ExperimentsTab;
+use crate::frames::Frames;
 use crate::friction::FrictionTab;
 use crate::history::{Channel, History};
 use crate::job::{Job, Outcome, Waker};
@@ -108,6 +109,7 @@ pub struct App {
     ctx: Context,
     frame_interval: Duration,
     frame_cpu_s: Option<f32>,
+    frames: Frames,
 }
 
 impl App {
@@ -184,6 +186,7 @@ impl App {
             ctx: ctx.clone(),
             frame_interval: Duration::from_millis(33),
             frame_cpu_s: None,
+            frames: Frames::default(),
         };
         app.reset_live();
         app.say_loaded();
@@ -374,9 +377,8 @@ impl App {
             self.say(message);
         }
         self.experiments.note_runs(&mut self.runs);
-        for run in [self.friction.take_finished(), self.refine.take_finished()].into_iter().flatten() {
-            self.runs.note(run);
-        }
+        self.friction.note_run(&mut self.runs);
+        self.refine.note_run(&mut self.runs);
         for result in
             [self.experiments.drain_saver(&self.waker), self.refine.drain_saver()].into_iter().flatten()
         {
@@ -507,7 +509,8 @@ impl App {
             ctx.request_repaint_after(wait);
             return;
         }
-        let state = self.snapshot();
+        let mut state = self.snapshot();
+        state["frames"] = self.frames.to_value();
         if let Some(out) = &mut self.state_out {
             out.write(state);
         }
@@ -577,6 +580,7 @@ impl eframe::App for App {
 
     fn logic(&mut self, ctx: &Context, frame: &mut eframe::Frame) {
         self.frame_cpu_s = frame.info().cpu_usage;
+        self.frames.note(Instant::now(), self.frame_cpu_s);
         Self::logic(self, ctx);
     }
 

@@ -5,7 +5,7 @@ use flqr_core::record::{HealthFinding, Severity};
 
 use crate::load::{LoadedLog, Loader};
 use crate::theme::palette;
-use crate::widgets::warning_ui;
+use crate::widgets::{error_ui, warning_ui};
 
 /// Line problems that are shown one by one.
 const SHOWN_PROBLEMS: usize = 3;
@@ -21,6 +21,20 @@ pub(crate) fn progress_ui(loader: &Loader, ui: &mut Ui) {
     );
     let share = loader.progress.map_or(0.0, |p| p.bytes as f32 / p.total_bytes.max(1) as f32);
     ui.add(ProgressBar::new(share).text(RichText::new(text).small()));
+}
+
+/// What is wrong with a log that was loaded, or that nothing is.
+pub(crate) fn log_ui(loaded: &LoadedLog, ui: &mut Ui) {
+    if let Err(problem) = &loaded.kind {
+        error_ui(ui, problem);
+    }
+    let harmless = loaded.health.iter().all(|finding| finding.severity == Severity::Info);
+    if harmless && loaded.kind.is_ok() && loaded.log.problem_count == 0 {
+        let color = palette(ui.visuals()).good;
+        ui.label(RichText::new("nothing wrong was found").small().color(color));
+    }
+    line_problems_ui(loaded, ui);
+    findings_ui(&loaded.health, ui);
 }
 
 /// One line for each finding.
@@ -47,7 +61,7 @@ pub(crate) fn findings_ui<'a>(findings: impl IntoIterator<Item = &'a HealthFindi
 }
 
 /// The first rows and cells that could not be used, where they are in the file.
-pub(crate) fn line_problems_ui(loaded: &LoadedLog, ui: &mut Ui) {
+fn line_problems_ui(loaded: &LoadedLog, ui: &mut Ui) {
     let log = &loaded.log;
     if log.problem_count == 0 {
         return;

@@ -4,12 +4,15 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use flqr_core::record::{
     ColumnMap, HealthFinding, Log, LogKind, ReadOptions, data_health, read_log, row_time_s,
 };
 
 use crate::job::{Job, Outcome, Reporter, Waker};
+use crate::runs::Sources;
+use crate::widgets::shown;
 
 /// A log in memory with what the page says about it.
 pub(crate) struct LoadedLog {
@@ -22,6 +25,8 @@ pub(crate) struct LoadedLog {
     pub(crate) axis: Axis,
     /// Rows a second, where there is a time.
     pub(crate) rate_hz: Option<f64>,
+    /// Hash of its columns, as in the ledger.
+    pub(crate) sources: Sources,
     /// Distinguishes logs, for the plot's cache.
     pub(crate) generation: u64,
 }
@@ -52,6 +57,9 @@ pub(crate) struct Loader {
     pub(crate) problem: Option<String>,
     log: Option<Box<LoadedLog>>,
     generation: u64,
+    started: Option<Instant>,
+    /// How long the last log took.
+    took: Option<Duration>,
 }
 
 impl Loader {
@@ -74,6 +82,7 @@ impl Loader {
         let job = Job::start("load-log", waker, move |reporter| load(&path, &map, generation, reporter))
             .map_err(|error| format!("No thread to load the log: {error}."))?;
         self.job = Some(job);
+        self.started = Some(Instant::now());
         self.progress = None;
         self.problem = None;
         Ok(())
@@ -95,6 +104,7 @@ impl Loader {
             Outcome::Broken => Err("Loading failed: this is a defect of flqr.".to_owned()),
         };
         self.job = None;
+        self.took = self.started.map(|started| started.elapsed());
         self.progress = None;
         Some(match result {
             Ok(loaded) => {
@@ -115,6 +125,7 @@ impl Loader {
             "problem": self.problem,
             "path": self.log().map(|loaded| loaded.path.display().to_string()),
             "rows": self.log().map(|loaded| loaded.log.rows()),
+            "seconds": self.took.map(|took| took.as_secs_f64()),
             "kind": self.log().and_then(|loaded| loaded.kind.as_ref().ok()),
             "health": self.log().map(|loaded| &loaded.health),
         })
@@ -147,10 +158,24 @@ impl LoadedLog {
             axis: axis(&log),
             rate_hz: rate_hz(&log),
             health: data_health(&log),
+            sources: Sources::new(None, [&log]),
             log: Arc::new(log),
             path: path.to_owned(),
             generation,
         }
+    }
+
+    /// Kind and size, in a line.
+    pub(crate) fn summary(&self) -> String {
+        let kind = match &self.kind {
+            Ok(LogKind::Bench) => "bench log of one motor",
+            Ok(LogKind::LinearAxis) => "log of a linear axis",
+            Ok(LogKind::Robot) => "robot log",
+            Ok(LogKind::FrictionPairs) => "friction pairs",
+            Err(_) => "unknown kind",
+        };
+        let rate = self.rate_hz.map(|rate| format!(", {} Hz", shown(rate, 4))).unwrap_or_default();
+        format!("{kind}: {} rows, {} columns{rate}", self.log.rows(), self.log.columns.len())
     }
 
     /// A log that was made in this program.

@@ -18,6 +18,16 @@ pub(crate) fn hint_ui(ui: &mut Ui, text: impl Into<String>) -> Response {
     ui.add(egui::Label::new(RichText::new(text).small().weak()).wrap())
 }
 
+/// What a page without content says: what is missing, and how it comes; `more` adds to it.
+pub(crate) fn empty_page_ui(ui: &mut Ui, missing: &str, hint: &str, more: impl FnOnce(&mut Ui)) {
+    ui.add_space(0.3 * ui.available_height());
+    ui.vertical_centered(|ui| {
+        ui.label(missing);
+        hint_ui(ui, hint);
+        more(ui);
+    });
+}
+
 /// A mistake, in the place where it was made.
 pub(crate) fn error_ui(ui: &mut Ui, text: impl Into<String>) -> Response {
     let color = palette(ui.visuals()).error;

@@ -1,6 +1,7 @@
 //! Replacing a file as a whole.
 
 use std::ffi::OsString;
+use std::fs::File;
 use std::io::Write;
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -8,11 +9,19 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// Writes by way of a second file beside `path`, so that a crash leaves the old content or the new one. Each
 /// call has a second file of its own, so that two at a time, also of two windows, never mix their contents.
 pub(crate) fn write_file(path: &Path, content: &[u8]) -> std::io::Result<()> {
+    write_file_with(path, |file| file.write_all(content))
+}
+
+/// The same of content that is made while it is written.
+pub(crate) fn write_file_with(
+    path: &Path,
+    write: impl FnOnce(&mut File) -> std::io::Result<()>,
+) -> std::io::Result<()> {
     if let Some(folder) = path.parent() {
         std::fs::create_dir_all(folder)?;
     }
     let beside = unique_name(path);
-    let written = write_through(&beside, content).and_then(|()| std::fs::rename(&beside, path));
+    let written = write_through(&beside, write).and_then(|()| std::fs::rename(&beside, path));
     if written.is_err() {
         std::fs::remove_file(&beside).ok();
     }
@@ -20,9 +29,12 @@ pub(crate) fn write_file(path: &Path, content: &[u8]) -> std::io::Result<()> {
 }
 
 /// A name that points at content that is still on its way would be an empty file after a loss of power.
-fn write_through(path: &OsString, content: &[u8]) -> std::io::Result<()> {
-    let mut file = std::fs::File::create(path)?;
-    file.write_all(content)?;
+fn write_through(
+    path: &OsString,
+    write: impl FnOnce(&mut File) -> std::io::Result<()>,
+) -> std::io::Result<()> {
+    let mut file = File::create(path)?;
+    write(&mut file)?;
     file.sync_all()
 }
 

@@ -42,7 +42,7 @@ pub use rows::{LogItem, LogRows};
 pub use sample::{BenchSample, Sample};
 pub use schema::LogKind;
 pub use time::row_time_s;
-pub use write::write_log;
+pub use write::{LogWriter, write_log};
 
 /// One column of a log.
 #[derive(Clone, Debug, PartialEq)]

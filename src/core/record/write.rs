@@ -10,18 +10,51 @@ use super::Log;
 /// # Errors
 /// What the writer reports.
 pub fn write_log(log: &Log, writer: impl Write) -> io::Result<()> {
-    let mut csv = csv::Writer::from_writer(writer);
-    csv.write_record(log.columns.iter().map(|column| column.name.as_bytes()))?;
-    let mut cell = String::new();
+    let mut rows = LogWriter::new(writer, log.columns.iter().map(|column| &*column.name))?;
     for row in 0..log.rows() {
-        for column in &log.columns {
-            cell.clear();
-            push_number(&mut cell, column.values[row]);
-            csv.write_field(&cell)?;
-        }
-        csv.write_record(None::<&[u8]>)?;
+        rows.push(log.columns.iter().map(|column| column.values[row]))?;
     }
-    csv.flush()
+    rows.finish()
+}
+
+/// Writes a log row by row, as [`write_log`] does, so that its length is no matter.
+pub struct LogWriter<W: Write> {
+    csv: csv::Writer<W>,
+    cell: String,
+}
+
+impl<W: Write> LogWriter<W> {
+    /// Writes the header.
+    ///
+    /// # Errors
+    /// What the writer reports.
+    pub fn new<'n>(writer: W, names: impl Iterator<Item = &'n str>) -> io::Result<Self> {
+        let mut csv = csv::Writer::from_writer(writer);
+        csv.write_record(names)?;
+        Ok(Self { csv, cell: String::new() })
+    }
+
+    /// Writes a row: one value for each name.
+    ///
+    /// # Errors
+    /// What the writer reports, and a number of values that differs from that of the names.
+    pub fn push(&mut self, values: impl Iterator<Item = f64>) -> io::Result<()> {
+        for value in values {
+            self.cell.clear();
+            push_number(&mut self.cell, value);
+            self.csv.write_field(&self.cell)?;
+        }
+        self.csv.write_record(None::<&[u8]>)?;
+        Ok(())
+    }
+
+    /// Hands all to the writer.
+    ///
+    /// # Errors
+    /// What the writer reports.
+    pub fn finish(mut self) -> io::Result<()> {
+        self.csv.flush()
+    }
 }
 
 /// Plain digits for usual magnitudes, an exponent for the others: `1e-300` in place of 300 zeros.

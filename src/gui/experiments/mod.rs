@@ -28,8 +28,9 @@ use crate::job::Waker;
 use crate::panes::{MARGIN, Pane, panes_ui};
 use crate::plot::Marks;
 use crate::runs::RunsTab;
+use crate::save_form::FileKind;
 use crate::theme::palette;
-use crate::widgets::{error_ui, hint_ui, section_ui, warning_ui};
+use crate::widgets::{empty_page_ui, error_ui, hint_ui, section_ui, warning_ui};
 use dials::{Dials, GREATEST_HEIGHT};
 use form::Limited;
 use playback::Playback;
@@ -119,7 +120,7 @@ impl ExperimentsTab {
 
     /// Starts both runs on `model`, which `path` holds if it is saved.
     pub(crate) fn start(&mut self, model: Model, path: Option<PathBuf>, waker: &Waker) -> Result<(), String> {
-        self.saver.problem = None;
+        self.saver.form.problem = None;
         self.runs
             .start(&self.settings, model, path, waker)
             .map_err(|error| format!("No thread for the runs: {error}."))
@@ -155,12 +156,12 @@ impl ExperimentsTab {
 
     /// Goes to the path to save to.
     pub(crate) fn focus_path(&mut self) {
-        self.saver.focus_path = true;
+        self.saver.form.focus_path = true;
     }
 
     pub(crate) fn note_dialog_problem(&mut self, purpose: FilePurpose, problem: &str) {
         if matches!(purpose, FilePurpose::SaveExperiment(_)) {
-            self.saver.problem = Some(problem.to_owned());
+            self.saver.form.problem = Some(problem.to_owned());
         }
     }
 
@@ -240,7 +241,10 @@ impl ExperimentsTab {
             let panes = [form, Pane::middle(Part::Plots, "Plots", 300.0)];
             panes_ui(ui, "no experiment", &panes, |part, ui| match part {
                 Part::Form => self.form_ui(context, ui),
-                _ => empty_ui(ui),
+                _ => {
+                    let hint = "Choose an experiment at the left and run it: both controllers appear here, side by side.";
+                    empty_page_ui(ui, "No run yet.", hint, |_| {});
+                }
             });
             return;
         };
@@ -445,15 +449,4 @@ fn commands_ui(comparison: &Comparison, ui: &mut Ui) {
     if comparison.model_path.is_none() {
         hint_ui(ui, "No file holds the model of these runs: save it, put its path in place of MODEL.toml.");
     }
-}
-
-fn empty_ui(ui: &mut Ui) {
-    ui.add_space(0.35 * ui.available_height());
-    ui.vertical_centered(|ui| {
-        ui.label("No run yet.");
-        hint_ui(
-            ui,
-            "Choose an experiment at the left and run it: both controllers appear here, side by side.",
-        );
-    });
 }

@@ -41,6 +41,7 @@ impl Plots {
         marks: &mut Marks,
     ) -> Moved {
         self.stack.update(marks.limits);
+        self.stack.sources = comparison.provenances();
         let panels = panels(ui, comparison);
         self.stack.show_marked(ui, &panels, Some(marks)).send(commands)
     }

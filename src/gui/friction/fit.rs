@@ -48,6 +48,8 @@ pub(super) struct FitRun {
     made_with: Option<MadeWith>,
     /// The row of a fit that has ended, until the ledger takes it.
     pub(super) finished: Option<Run>,
+    /// The row of the last fit.
+    pub(super) row: Option<Run>,
     problem: Option<String>,
 }
 
@@ -67,6 +69,7 @@ impl Default for FitRun {
             report: None,
             made_with: None,
             finished: None,
+            row: None,
             problem: None,
         }
     }
@@ -172,6 +175,7 @@ impl FitRun {
         self.convergence.clear();
         self.last_step = None;
         self.report = None;
+        self.row = None;
         self.problem = None;
     }
 

@@ -18,6 +18,7 @@ use crate::context::ViewContext;
 use crate::job::Waker;
 use crate::load::Loader;
 use crate::panes::{Pane, panes_ui};
+use crate::runs::{Run, RunsTab};
 use fit::FitRun;
 pub(crate) use fitted::Fitted;
 use preview::Preview;
@@ -122,9 +123,11 @@ impl FrictionTab {
         self.fit.drain().or(loaded)
     }
 
-    /// The row of a fit that has just ended.
-    pub(crate) fn take_finished(&mut self) -> Option<crate::runs::Run> {
-        self.fit.finished.take()
+    /// Gives a fit that has just ended its row.
+    pub(crate) fn note_run(&mut self, ledger: &mut RunsTab) {
+        if let Some(row) = self.fit.finished.take() {
+            self.fit.row = Some(Run { number: ledger.note(row.clone()), ..row });
+        }
     }
 
     pub(crate) fn snapshot(&self) -> serde_json::Value {
@@ -153,7 +156,8 @@ impl FrictionTab {
         let half = 0.5 * ui.available_height();
         ui.allocate_ui(egui::vec2(ui.available_width(), half), |ui| {
             ui.set_min_height(half);
-            self.preview.ui(context, &self.loader, ui);
+            let row = self.fit.row.as_ref().filter(|_| self.fit.report.is_some());
+            self.preview.ui(context, &self.loader, row, ui);
         });
         let kind = self.loader.log().and_then(|loaded| loaded.kind.as_ref().ok().copied());
         charts::ui(context, &self.fit, kind, ui);

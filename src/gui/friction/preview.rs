@@ -1,13 +1,13 @@
 //! What is in the log: kind, rate, columns, first rows, and one column as a plot.
 
 use egui::{ComboBox, RichText, ScrollArea, Ui};
-use flqr_core::record::LogKind;
 
 use crate::context::ViewContext;
 use crate::load::{LoadedLog, Loader};
 use crate::plot::{Data, Panel, PanelCurve, Stack, Unit};
+use crate::runs::Run;
 use crate::theme::palette;
-use crate::widgets::{choice_ui, hint_ui, mono, section_ui, shown};
+use crate::widgets::{choice_ui, empty_page_ui, hint_ui, mono, section_ui, shown};
 
 const FIRST_ROWS: usize = 12;
 
@@ -33,19 +33,31 @@ impl Default for Preview {
 }
 
 impl Preview {
-    pub(super) fn ui(&mut self, context: &ViewContext<'_>, loader: &Loader, ui: &mut Ui) {
+    /// `row` is that of the log's last fit.
+    pub(super) fn ui(&mut self, context: &ViewContext<'_>, loader: &Loader, row: Option<&Run>, ui: &mut Ui) {
         section_ui(ui, "Measured", |ui| {
             if let Some(loaded) = loader.log() {
                 self.controls_ui(loaded, ui);
             }
         });
         let Some(loaded) = loader.log() else {
-            empty_ui(ui);
-            return;
+            let hint = "Open, type or drop a CSV file whose columns carry their units, such as:";
+            return empty_page_ui(ui, "No log yet.", hint, |ui| {
+                for columns in [
+                    "time_s, motor_angle_rad, torque_nm",
+                    "speed_rad_s, torque_nm",
+                    "time_s, position_m, force_n",
+                ] {
+                    ui.label(mono(columns));
+                }
+            });
         };
-        hint_ui(ui, summary(loaded));
+        hint_ui(ui, loaded.summary());
         match self.show {
-            Show::Plot => self.plot_ui(context, loaded, ui),
+            Show::Plot => {
+                self.stack.sources = sources(loaded, row);
+                self.plot_ui(context, loaded, ui);
+            }
             Show::Rows => rows_ui(loaded, ui),
         }
     }
@@ -114,29 +126,10 @@ impl Preview {
     }
 }
 
-fn empty_ui(ui: &mut Ui) {
-    ui.add_space(0.3 * ui.available_height());
-    ui.vertical_centered(|ui| {
-        ui.label("No log yet.");
-        hint_ui(ui, "Open, type or drop a CSV file whose columns carry their units, such as:");
-        for columns in
-            ["time_s, motor_angle_rad, torque_nm", "speed_rad_s, torque_nm", "time_s, position_m, force_n"]
-        {
-            ui.label(mono(columns));
-        }
-    });
-}
-
-fn summary(loaded: &LoadedLog) -> String {
-    let kind = match &loaded.kind {
-        Ok(LogKind::Bench) => "bench log of one motor",
-        Ok(LogKind::LinearAxis) => "log of a linear axis",
-        Ok(LogKind::Robot) => "robot log",
-        Ok(LogKind::FrictionPairs) => "friction pairs",
-        Err(_) => "unknown kind",
-    };
-    let rate = loaded.rate_hz.map(|rate| format!(", {} Hz", shown(rate, 4))).unwrap_or_default();
-    format!("{kind}: {} rows, {} columns{rate}", loaded.log.rows(), loaded.log.columns.len())
+/// Where the curve comes from, for exports: the log, and what was made of it.
+fn sources(loaded: &LoadedLog, row: Option<&Run>) -> Vec<String> {
+    let log = format!("log {}, sources {}", loaded.path.display(), loaded.sources.hex());
+    std::iter::once(log).chain(row.map(Run::provenance)).collect()
 }
 
 fn rows_ui(loaded: &LoadedLog, ui: &mut Ui) {

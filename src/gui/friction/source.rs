@@ -2,15 +2,13 @@
 
 use std::path::PathBuf;
 
-use egui::{RichText, TextEdit, Ui};
-use flqr_core::record::Severity;
+use egui::{TextEdit, Ui};
 
 use crate::column_map::ColumnMapForm;
 use crate::command::{Command, FilePurpose};
 use crate::context::ViewContext;
-use crate::health_card::{findings_ui, line_problems_ui, progress_ui};
+use crate::health_card::{log_ui, progress_ui};
 use crate::load::Loader;
-use crate::theme::palette;
 use crate::widgets::{error_ui, hint_ui, section_ui, warning_ui};
 
 /// What has been typed.
@@ -90,14 +88,5 @@ impl SourceForm {
 pub(super) fn health_ui(loader: &Loader, ui: &mut Ui) {
     let Some(loaded) = loader.log() else { return };
     section_ui(ui, "Data health", |_| {});
-    let colors = palette(ui.visuals());
-    if let Err(problem) = &loaded.kind {
-        error_ui(ui, problem);
-    }
-    let harmless = loaded.health.iter().all(|finding| finding.severity == Severity::Info);
-    if harmless && loaded.kind.is_ok() && loaded.log.problem_count == 0 {
-        ui.label(RichText::new("nothing wrong was found").small().color(colors.good));
-    }
-    line_problems_ui(loaded, ui);
-    findings_ui(&loaded.health, ui);
+    log_ui(loaded, ui);
 }

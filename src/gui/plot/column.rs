@@ -3,6 +3,7 @@
 
 use std::collections::VecDeque;
 use std::ops::Range;
+use std::sync::Arc;
 
 use super::pyramid::{Pyramid, Steps};
 
@@ -11,20 +12,21 @@ pub(super) const BLOCK: usize = 32;
 /// Samples of a chunk, which is what is dropped at once.
 pub const CHUNK: usize = 512 * BLOCK;
 
-/// Numbers in chunks.
+/// Numbers in chunks; a clone shares them, so that a worker can read them while more are appended.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Chunks {
-    chunks: VecDeque<Vec<f64>>,
+    chunks: VecDeque<Arc<Vec<f64>>>,
 }
 
 impl Chunks {
     fn push(&mut self, value: f64) {
         match self.chunks.back_mut() {
-            Some(chunk) if chunk.len() < CHUNK => chunk.push(value),
+            // Copied first if a worker reads it.
+            Some(chunk) if chunk.len() < CHUNK => Arc::make_mut(chunk).push(value),
             _ => {
                 let mut chunk = Vec::with_capacity(CHUNK);
                 chunk.push(value);
-                self.chunks.push_back(chunk);
+                self.chunks.push_back(Arc::new(chunk));
             }
         }
     }
@@ -67,6 +69,16 @@ impl<'a> Values<'a> {
         }
     }
 
+    /// What a worker can keep: a slice is copied, chunks are shared.
+    pub(super) fn held(self, range: Range<usize>) -> Held {
+        match self {
+            Self::Slice(values) => {
+                Held { values: HeldValues::Copied(values[range.clone()].to_vec()), range: 0..range.len() }
+            }
+            Self::Chunks(values) => Held { values: HeldValues::Shared(values.clone()), range },
+        }
+    }
+
     /// The end of the part of `range` whose samples are `before`, as `slice::partition_point` has it.
     pub(super) fn partition_point(self, range: Range<usize>, before: impl Fn(f64) -> bool) -> usize {
         let (mut low, mut high) = (range.start, range.end);
@@ -75,6 +87,33 @@ impl<'a> Values<'a> {
             if before(self.at(middle)) { low = middle + 1 } else { high = middle }
         }
         low
+    }
+}
+
+/// Numbers of a range that stay as they are, whatever becomes of the column.
+#[derive(Clone, Debug)]
+pub(super) struct Held {
+    values: HeldValues,
+    range: Range<usize>,
+}
+
+#[derive(Clone, Debug)]
+enum HeldValues {
+    Copied(Vec<f64>),
+    Shared(Chunks),
+}
+
+impl Held {
+    pub(super) fn len(&self) -> usize {
+        self.range.len()
+    }
+
+    pub(super) fn at(&self, index: usize) -> f64 {
+        let values = match &self.values {
+            HeldValues::Copied(values) => Values::Slice(values),
+            HeldValues::Shared(values) => Values::Chunks(values),
+        };
+        values.at(self.range.start + index)
     }
 }
 

@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use egui_plot::PlotPoint;
 
-use super::column::{TimeColumn, ValueColumn, Values};
+use super::column::{Held, TimeColumn, ValueColumn, Values};
 use super::pyramid::{Extremes, Gaps, Pyramid, Steps, Summary};
 
 /// Data of one curve.
@@ -90,6 +90,31 @@ pub(super) struct Indexed<'a> {
     length: usize,
 }
 
+/// Samples of a range that stay as they are, for a worker.
+#[derive(Clone, Debug)]
+pub(super) struct Snapshot {
+    x: Held,
+    y: Held,
+    scale: f64,
+}
+
+impl Snapshot {
+    /// Number of samples.
+    pub(super) fn len(&self) -> usize {
+        self.x.len()
+    }
+
+    /// Time of a sample.
+    pub(super) fn x(&self, index: usize) -> f64 {
+        self.x.at(index)
+    }
+
+    /// A sample as it is shown.
+    pub(super) fn y(&self, index: usize) -> f64 {
+        self.y.at(index) * self.scale
+    }
+}
+
 impl<'a> Indexed<'a> {
     fn new(gaps: Gaps<'a>, scale: f64) -> Self {
         let length = gaps.x.len().min(gaps.y.len());
@@ -165,6 +190,12 @@ impl<'a> Indexed<'a> {
             start = gap + usize::from(is_hole || gap == start);
         }
         best
+    }
+
+    /// The samples of a range for a worker.
+    pub(super) fn snapshot(&self, range: Range<usize>) -> Snapshot {
+        let (x, y) = (self.gaps.x.held(range.clone()), self.gaps.y.held(range));
+        Snapshot { x, y, scale: self.scale }
     }
 
     /// What is drawn between `range[0]` and `range[1]` in a plot of `columns` pixels.

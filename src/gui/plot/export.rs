@@ -1,16 +1,20 @@
 //! Saving what a stack of plots shows: the visible samples as a log, the figure as SVG or PNG.
 
+use std::io::{self, BufWriter, Write};
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use egui::{Context, DragValue, Id, Key, Rect, TextEdit, Ui};
-use flqr_core::record::{Log, write_log};
+use egui::{Context, DragValue, Id, Key, ProgressBar, Rect, RichText, TextEdit, Ui};
+use flqr_core::record::LogWriter;
 use flqr_core::report::Chart;
 
-use crate::job::{Job, Outcome, Waker};
+use super::decimate::Snapshot;
+use crate::job::{Job, Outcome, Reporter, Waker};
 use crate::picture::Shot;
+use crate::save_form::{FileKind, not_saved, with_ending};
 use crate::widgets::{choice_ui, error_ui, warning_ui};
-use crate::write_file::write_file;
+use crate::write_file::write_file_with;
 
 /// What is saved of a figure.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -24,8 +28,8 @@ pub enum FigureKind {
     Png,
 }
 
-impl FigureKind {
-    const ALL: [(Self, &'static str, &'static str); 3] = [
+impl FileKind for FigureKind {
+    const ALL: &'static [(Self, &'static str, &'static str)] = &[
         (
             Self::Csv,
             "CSV",
@@ -35,8 +39,7 @@ impl FigureKind {
         (Self::Png, "PNG", "The plots as they are on the screen"),
     ];
 
-    /// Ending of the file.
-    pub(crate) fn extension(self) -> &'static str {
+    fn extension(self) -> &'static str {
         match self {
             Self::Csv => "csv",
             Self::Svg => "svg",
@@ -75,28 +78,24 @@ impl FigureFile {
 #[derive(Clone, Default)]
 struct Answer(Option<(FigureKind, Result<PathBuf, String>)>);
 
-/// Samples of one curve.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Samples {
-    pub(super) key: String,
-    pub(super) x: Vec<f64>,
-    pub(super) y: Vec<f64>,
-}
-
-/// What is to be written.
+/// What is to be written; `sources` say where the curves come from.
 pub(super) enum Content {
-    Log { x_key: &'static str, curves: Vec<Samples> },
+    Log { x_key: &'static str, curves: Vec<(String, Snapshot)>, sources: Vec<String> },
     Chart(Box<Chart>, [f64; 2]),
-    Picture,
+    Picture { sources: Vec<String> },
 }
 
 enum Saved {
     Written,
     Exists,
+    Cancelled,
 }
 
+/// Share of what is written, from 0 to 1.
+type Share = f32;
+
 /// Writes a figure.
-type SaveJob = Job<(), Result<Saved, String>>;
+type SaveJob = Job<Share, Result<Saved, String>>;
 
 /// The form and what it has started.
 #[derive(Default)]
@@ -105,8 +104,9 @@ pub(super) struct Export {
     pub(super) kind: FigureKind,
     path: String,
     size: Option<[f64; 2]>,
-    shot: Option<(PathBuf, bool, Shot)>,
+    shot: Option<(PathBuf, bool, Vec<String>, Shot)>,
     job: Option<(PathBuf, SaveJob)>,
+    share: Share,
     problem: Option<String>,
     /// What is there already and was not replaced.
     existing: Option<PathBuf>,
@@ -148,6 +148,7 @@ impl Export {
         }
         if self.open {
             ui.horizontal_wrapped(|ui| self.form_ui(ui, &mut asked));
+            self.progress_ui(ui);
             if let Some(problem) = &self.problem {
                 error_ui(ui, problem);
             }
@@ -155,9 +156,21 @@ impl Export {
         asked
     }
 
+    /// Only what takes its time has progress.
+    fn progress_ui(&self, ui: &mut Ui) {
+        let Some((path, job)) = self.job.as_ref().filter(|_| self.share > 0.0) else { return };
+        ui.horizontal(|ui| {
+            if ui.button("Cancel export").on_hover_text("Stop writing; no file is left").clicked() {
+                job.cancel();
+            }
+            let text = RichText::new(format!("{}, {:.0} %", path.display(), 100.0 * self.share)).small();
+            ui.add(ProgressBar::new(self.share).text(text));
+        });
+    }
+
     fn form_ui(&mut self, ui: &mut Ui, asked: &mut Asked) {
         ui.label("Export the visible range as");
-        ui.scope(|ui| choice_ui(ui, &mut self.kind, &FigureKind::ALL));
+        ui.scope(|ui| choice_ui(ui, &mut self.kind, FigureKind::ALL));
         if self.kind == FigureKind::Svg {
             let mut size = self.size();
             for (side, name) in size.iter_mut().zip(["figure width", "figure height"]) {
@@ -200,11 +213,15 @@ impl Export {
         }
         (self.problem, self.existing) = (None, None);
         match content {
-            Content::Picture => self.shot = Some((path, replace, Shot::ask(ui.ctx(), part))),
-            Content::Chart(chart, size) => {
-                self.write(ui, path, replace, move || Ok(chart.to_svg_of(size).into_bytes()));
+            Content::Picture { sources } => {
+                self.shot = Some((path, replace, sources, Shot::ask(ui.ctx(), part)));
             }
-            Content::Log { x_key, curves } => self.write(ui, path, replace, move || csv(x_key, curves)),
+            Content::Chart(chart, size) => {
+                self.write(ui, path, replace, move |file, _| file.write_all(chart.to_svg_of(size).as_bytes()))
+            }
+            Content::Log { x_key, curves, sources } => {
+                self.write(ui, path, replace, move |file, share| csv(x_key, &curves, &sources, file, share))
+            }
         }
     }
 
@@ -213,12 +230,13 @@ impl Export {
         ui: &Ui,
         path: PathBuf,
         replace: bool,
-        content: impl FnOnce() -> Result<Vec<u8>, String> + Send + 'static,
+        content: impl FnOnce(&mut dyn Write, Watch<'_>) -> io::Result<()> + Send + 'static,
     ) {
         let ctx = ui.ctx().clone();
         let waker: Waker = Arc::new(move || ctx.request_repaint());
         let file = path.clone();
-        let work = move |_: &crate::job::Reporter<()>| save(&file, replace, content);
+        let work = move |reporter: &Reporter<Share>| save(&file, replace, content, reporter);
+        self.share = 0.0;
         match Job::start("save-figure", &waker, work) {
             Ok(job) => self.job = Some((path, job)),
             Err(error) => self.problem = Some(format!("No thread to write the figure: {error}.")),
@@ -227,17 +245,24 @@ impl Export {
 
     /// A sentence when something was written.
     pub(super) fn drain(&mut self, ui: &Ui) -> Option<String> {
-        if let Some((path, replace, shot)) = self.shot.take() {
+        if let Some((path, replace, sources, shot)) = self.shot.take() {
             match shot.poll() {
-                Some(Ok(picture)) => self.write(ui, path, replace, move || picture.png()),
+                Some(Ok(picture)) => self.write(ui, path, replace, move |file, _| {
+                    file.write_all(&picture.png(&sources).map_err(io::Error::other)?)
+                }),
                 Some(Err(problem)) => self.problem = Some(problem),
-                None => self.shot = Some((path, replace, shot)),
+                None => self.shot = Some((path, replace, sources, shot)),
             }
         }
         let (path, mut job) = self.job.take()?;
-        match job.poll().1 {
+        let (shares, outcome) = job.poll();
+        self.share = shares.last().copied().unwrap_or(self.share);
+        match outcome {
             Outcome::Running => self.job = Some((path, job)),
             Outcome::Done(Ok(Saved::Written)) => return Some(format!("Saved {}.", path.display())),
+            Outcome::Done(Ok(Saved::Cancelled)) => {
+                return Some(format!("Cancelled: {} was not written.", path.display()));
+            }
             Outcome::Done(Ok(Saved::Exists)) => self.existing = Some(path),
             Outcome::Done(Err(problem)) => self.problem = Some(problem),
             Outcome::Broken => {
@@ -248,110 +273,136 @@ impl Export {
     }
 }
 
-fn with_ending(path: PathBuf, kind: FigureKind) -> PathBuf {
-    let known =
-        |ending: &std::ffi::OsStr| FigureKind::ALL.iter().any(|(kind, ..)| ending == kind.extension());
-    if path.extension().is_some_and(known) {
-        return path.with_extension(kind.extension());
-    }
-    let mut name = path.into_os_string();
-    name.push(".");
-    name.push(kind.extension());
-    name.into()
-}
-
 fn save(
     path: &Path,
     replace: bool,
-    content: impl FnOnce() -> Result<Vec<u8>, String>,
+    content: impl FnOnce(&mut dyn Write, Watch<'_>) -> io::Result<()>,
+    reporter: &Reporter<Share>,
 ) -> Result<Saved, String> {
     if !replace && path.symlink_metadata().is_ok() {
         return Ok(Saved::Exists);
     }
-    write_file(path, &content()?).map_err(|error| {
-        format!(
-            "{} could not be saved: {error}; check the folder, its permissions and the space on the disk",
-            path.display()
-        )
-    })?;
-    Ok(Saved::Written)
+    let written = write_file_with(path, |file| {
+        let mut file = BufWriter::with_capacity(1 << 16, file);
+        content(&mut file, &mut |share| reporter.progress(share))?;
+        file.flush()
+    });
+    match written {
+        Ok(()) => Ok(Saved::Written),
+        Err(_) if reporter.is_cancelled() => Ok(Saved::Cancelled),
+        Err(error) => Err(not_saved(path, &error)),
+    }
 }
 
-fn csv(x_key: &'static str, curves: Vec<Samples>) -> Result<Vec<u8>, String> {
-    let mut text = Vec::new();
-    let log = merged(x_key, curves);
-    write_log(&log, &mut text).map_err(|error| format!("the log has no text: {error}"))?;
-    Ok(text)
-}
+/// Is told the share that is written, and may break off.
+type Watch<'w> = &'w mut dyn FnMut(Share) -> ControlFlow<()>;
+
+/// Rows between two reports of progress.
+const WATCH_ROWS: usize = 8192;
 
 /// One row for each time of any curve; a cell is empty where a curve has no sample then.
-fn merged(x_key: &'static str, curves: Vec<Samples>) -> Log {
-    let first = curves.first().map(|curve| curve.x.clone()).unwrap_or_default();
-    if curves.iter().all(|curve| curve.x == first) {
-        let columns = curves.into_iter().map(|curve| (curve.key, curve.y));
-        return Log::from_columns("", std::iter::once((x_key.to_owned(), first)).chain(columns));
+fn csv(
+    x_key: &str,
+    curves: &[(String, Snapshot)],
+    sources: &[String],
+    file: &mut dyn Write,
+    watch: Watch<'_>,
+) -> io::Result<()> {
+    for source in sources {
+        writeln!(file, "# {}", one_line(source))?;
     }
-    let mut times: Vec<f64> = curves.iter().flat_map(|curve| curve.x.iter().copied()).collect();
-    times.sort_unstable_by(f64::total_cmp);
-    times.dedup();
-    let column = |curve: &Samples| {
-        let mut samples = curve.x.iter().zip(&curve.y).peekable();
-        let value = |time: &f64| {
-            let mut value = f64::NAN;
-            while let Some((_, y)) = samples.next_if(|(x, _)| *x <= time) {
-                value = *y;
+    let names = std::iter::once(x_key).chain(curves.iter().map(|(key, _)| key.as_str()));
+    let mut log = LogWriter::new(file, names)?;
+    let total: usize = curves.iter().map(|(_, curve)| curve.len()).sum();
+    let mut next = vec![0; curves.len()];
+    let mut row = Vec::with_capacity(curves.len() + 1);
+    for number in 1_usize.. {
+        let waiting =
+            |(curve, next): (&(String, Snapshot), &usize)| (*next < curve.1.len()).then(|| curve.1.x(*next));
+        let times = curves.iter().zip(&next).filter_map(waiting);
+        let Some(time) = times.reduce(f64::min) else { break };
+        row.clear();
+        row.push(time);
+        for ((_, curve), next) in curves.iter().zip(&mut next) {
+            let has_sample = *next < curve.len() && curve.x(*next) == time;
+            row.push(if has_sample { curve.y(*next) } else { f64::NAN });
+            *next += usize::from(has_sample);
+        }
+        log.push(row.iter().copied())?;
+        if number.is_multiple_of(WATCH_ROWS) {
+            let share = next.iter().sum::<usize>() as f32 / total as f32;
+            if watch(share).is_break() {
+                return Err(io::Error::other("cancelled"));
             }
-            value
-        };
-        times.iter().map(value).collect()
-    };
-    let columns: Vec<(String, Vec<f64>)> =
-        curves.iter().map(|curve| (curve.key.clone(), column(curve))).collect();
-    Log::from_columns("", std::iter::once((x_key.to_owned(), times.clone())).chain(columns))
+        }
+    }
+    log.finish()
+}
+
+/// A comment ends with its line.
+fn one_line(text: &str) -> String {
+    text.split(['\n', '\r']).collect::<Vec<_>>().join(" ")
 }
 
 #[cfg(test)]
 mod tests {
-    use std::ops::ControlFlow;
-
     use flqr_core::record::{ColumnMap, ReadOptions, read_log};
 
     use super::*;
+
+    use super::super::decimate::{Data, DecimationCache};
+
+    fn snapshot(x: &[f64], y: &[f64]) -> Snapshot {
+        DecimationCache::default().indexed(Data::Fixed(x, y), [1.0, 1.0], 1).snapshot(0..x.len())
+    }
+
+    fn text(curves: &[(String, Snapshot)], sources: &[&str]) -> String {
+        let sources: Vec<String> = sources.iter().map(|source| (*source).to_owned()).collect();
+        let mut text = Vec::new();
+        csv("time_s", curves, &sources, &mut text, &mut |_| ControlFlow::Continue(())).unwrap();
+        String::from_utf8(text).unwrap()
+    }
 
     #[test]
     fn an_exported_range_reads_back_equal() {
         let x: Vec<f64> = (0..500).map(|row| f64::from(row) * 1e-3 + 0.1).collect();
         let y = |factor: f64| x.iter().map(|x| (factor * x).sin() / 3.0).collect::<Vec<_>>();
-        let curve = |key: &str, factor| Samples { key: key.to_owned(), x: x.clone(), y: y(factor) };
-        let curves = vec![curve("pitch_rad", 3.0), curve("x_m", 0.7)];
-        let text = csv("time_s", curves.clone()).unwrap();
+        let columns = [("pitch_rad", y(3.0)), ("x_m", y(0.7))];
+        let curves = columns.each_ref().map(|(key, y)| ((*key).to_owned(), snapshot(&x, y)));
+        let text = text(&curves, &["run 3: flat, FLQR\nand more"]);
+        assert!(text.starts_with("# run 3: flat, FLQR and more\ntime_s,pitch_rad,x_m\n"), "{}", &text[..80]);
         let map = ColumnMap::default();
         let watch = &mut |_: flqr_core::record::ReadProgress| ControlFlow::Continue(());
-        let log = read_log(text.as_slice(), "figure.csv", &ReadOptions::new(&map), watch).unwrap();
+        let log = read_log(text.as_bytes(), "figure.csv", &ReadOptions::new(&map), watch).unwrap();
         assert_eq!((log.column("time_s"), log.problem_count), (Some(x.as_slice()), 0));
-        for curve in &curves {
-            assert_eq!(log.column(&curve.key), Some(curve.y.as_slice()));
+        for (key, y) in &columns {
+            assert_eq!(log.column(key), Some(y.as_slice()));
         }
     }
 
     #[test]
     fn curves_of_different_times_share_rows_where_they_can() {
-        let samples =
-            |key: &str, x: &[f64], y: &[f64]| Samples { key: key.to_owned(), x: x.to_vec(), y: y.to_vec() };
-        let curves =
-            vec![samples("a", &[0.0, 1.0, 2.0], &[1.0, 2.0, 3.0]), samples("b", &[1.0, 1.5], &[7.0, 8.0])];
-        let text = String::from_utf8(csv("time_s", curves).unwrap()).unwrap();
-        assert_eq!(text, "time_s,a,b\n0,1,\n1,2,7\n1.5,,8\n2,3,\n");
+        let curves = [
+            ("a".to_owned(), snapshot(&[0.0, 1.0, 2.0], &[1.0, 2.0, 3.0])),
+            ("b".to_owned(), snapshot(&[1.0, 1.5], &[7.0, 8.0])),
+        ];
+        assert_eq!(text(&curves, &[]), "time_s,a,b\n0,1,\n1,2,7\n1.5,,8\n2,3,\n");
     }
 
     #[test]
-    fn the_ending_is_that_of_what_is_saved() {
-        for (name, kind, expected) in [
-            ("a", FigureKind::Svg, "a.svg"),
-            ("a.csv", FigureKind::Png, "a.png"),
-            ("v1.2", FigureKind::Csv, "v1.2.csv"),
-        ] {
-            assert_eq!(with_ending(name.into(), kind), PathBuf::from(expected));
-        }
+    fn a_cancelled_export_leaves_no_file() {
+        let x: Vec<f64> = (0..3 * WATCH_ROWS).map(|row| row as f64).collect();
+        let curve = [("a".to_owned(), snapshot(&x, &x))];
+        let path = std::env::temp_dir().join(format!("flqr-cancelled-{}.csv", std::process::id()));
+        let shares = Arc::new(std::sync::Mutex::new(Vec::new()));
+        let seen = Arc::clone(&shares);
+        let written = write_file_with(&path, |file| {
+            csv("time_s", &curve, &[], file, &mut |share| {
+                seen.lock().unwrap().push(share);
+                if share < 0.5 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+            })
+        });
+        assert!(written.is_err() && !path.exists());
+        assert_eq!(*shares.lock().unwrap(), [1.0 / 3.0, 2.0 / 3.0]);
     }
 }

@@ -3,18 +3,8 @@
 use egui_plot::PlotPoint;
 use flqr_core::report::{Axis, Chart, Limit, Mark, Panel, Series};
 
-use super::decimate::Indexed;
-use super::export::Samples;
-
 /// Columns that a figure is drawn of: two points each.
 pub(super) const COLUMNS: usize = 2000;
-
-/// The samples of a range.
-pub(super) fn samples(key: &str, curve: &Indexed<'_>, range: [f64; 2]) -> Samples {
-    let inside = curve.inside(range);
-    let x = inside.clone().map(|index| curve.x(index)).collect();
-    Samples { key: key.to_owned(), x, y: inside.map(|index| curve.y(index)).collect() }
-}
 
 /// A plot as a panel of a chart; curves with their names, in the shown unit.
 pub(super) fn panel(
@@ -46,18 +36,25 @@ fn points(pieces: &[Vec<PlotPoint>]) -> Vec<[f64; 2]> {
     points
 }
 
-/// The panels over the visible range.
-pub(super) fn chart(name: &str, x_label: &str, range: [f64; 2], panels: Vec<Panel>) -> Chart {
+/// The panels over the visible range; `sources` say where the curves come from.
+pub(super) fn chart(
+    name: &str,
+    x_label: &str,
+    range: [f64; 2],
+    panels: Vec<Panel>,
+    sources: &[String],
+) -> Chart {
     let (title, unit) = match x_label {
         "time [s]" => ("Time", "s"),
         _ => ("Row", ""),
     };
     let shown: Vec<_> = panels.iter().map(|panel| panel.y.label()).collect();
+    let of: String = sources.iter().map(|source| format!(" Of {source}.")).collect();
     let mut x = Axis::new(title, unit);
     x.range = Some(range);
     Chart {
         title: format!("{name}: {}", shown.join("; ")),
-        description: format!("{} from {} to {} {unit}", shown.join("; "), range[0], range[1]),
+        description: format!("{} from {} to {} {unit}.{of}", shown.join("; "), range[0], range[1]),
         x,
         panels,
     }

@@ -25,4 +25,4 @@ pub use export::{FigureFile, FigureKind};
 pub use marks::{Marks, Moved};
 pub use stack::{Panel, PanelCurve, Stack, Wishes};
 pub use unit::{Unit, UnitChoice};
-pub use view::{DataCurve, TimeCurve, TimePlot, TimeView};
+pub use view::TimeView;

@@ -1,5 +1,5 @@
-//! A pyramid over a column: extremes, mean and gaps of blocks of 64 samples, of 8 such blocks, and so on. Any
-//! range is answered exactly from a few nodes and at most 126 samples, whatever its length.
+//! A pyramid over a column: extremes, mean and gaps of blocks of 32 samples, of 8 such blocks, and so on. Any
+//! range is answered exactly from a few nodes and at most 62 samples, whatever its length.
 //!
 //! Nodes exist for complete blocks only, so appending never changes one; the samples behind the last complete
 //! block are read one by one. What is not finite counts as a gap and never as a value.
@@ -11,7 +11,7 @@ use super::column::{BLOCK, CHUNK, Values};
 
 /// Nodes that a node of the next level covers.
 const FAN: usize = 8;
-/// Levels: 64, 512, 4096 and 32 768 samples a node.
+/// Levels: 32, 256, 2048 and 16 384 samples a node.
 const LEVELS: usize = 4;
 
 /// Samples of a node.

@@ -1,14 +1,16 @@
 //! Spectra of what is visible, as plots of their own below each other.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use egui::{Color32, RichText, Ui, vec2};
 
-use super::decimate::{Curve, DecimationCache, Indexed};
+use super::decimate::{Curve, DecimationCache, Snapshot};
 use super::spectrum::Spectrum;
 use super::unit::label;
 use super::view::{Drawing, TimePlot, TimeView, columns, interact, y_range};
-use crate::widgets::{mono, shown};
+use crate::job::{Job, Outcome, Waker};
+use crate::widgets::{error_ui, mono, shown};
 
 /// While the range moves, a spectrum is made anew at most this often, s.
 const INTERVAL_S: f64 = 0.25;
@@ -42,13 +44,19 @@ impl Measure {
 /// The spectrum of one curve, and what it was made of.
 #[derive(Default)]
 struct Entry {
+    /// Generation and range of what was asked for last.
     of: Option<(u64, [u64; 2])>,
-    made_s: f64,
     generation: u64,
+    found: Found,
+    caches: [DecimationCache; 2],
+}
+
+/// What a worker brings.
+#[derive(Default)]
+struct Found {
     spectrum: Spectrum,
     /// Logarithms of amplitude and density.
     logarithms: [Vec<f64>; 2],
-    caches: [DecimationCache; 2],
     problem: Option<&'static str>,
 }
 
@@ -57,43 +65,93 @@ pub(super) struct Spectra {
     pub(super) measure: Measure,
     view: TimeView,
     entries: BTreeMap<String, Entry>,
+    job: Option<Job<(), Vec<(String, Found)>>>,
+    /// When the job was started.
+    started_s: f64,
+    problem: Option<String>,
     reach_hz: f64,
 }
 
 impl Default for Spectra {
     fn default() -> Self {
-        let view = TimeView::following(1.0);
-        Self { measure: Measure::default(), view, entries: BTreeMap::new(), reach_hz: 0.0 }
+        Self {
+            measure: Measure::default(),
+            view: TimeView::following(1.0),
+            entries: BTreeMap::new(),
+            job: None,
+            started_s: f64::NEG_INFINITY,
+            problem: None,
+            reach_hz: 0.0,
+        }
     }
 }
 
 impl Spectra {
-    /// Makes the spectrum of a curve anew where data or range have changed, though not too often.
-    pub(super) fn update<'c>(
+    /// Has the spectra of what has changed made anew by a worker, though not too often; each curve has its name, the
+    /// generation of its data, and what to hand to the worker.
+    pub(super) fn update(
         &mut self,
         ui: &Ui,
-        key: String,
-        generation: u64,
         range: [f64; 2],
-        curve: impl FnOnce() -> Indexed<'c>,
+        curves: &[(String, u64)],
+        mut snapshot: impl FnMut(usize) -> Snapshot,
     ) {
-        let entry = self.entries.entry(key).or_default();
-        let now = ui.input(|input| input.time);
-        let of = Some((generation, range.map(f64::to_bits)));
-        if entry.of == of {
+        self.drain();
+        let of = |generation: u64| Some((generation, range.map(f64::to_bits)));
+        let is_old = |(key, generation): &(String, u64)| {
+            self.entries.get(key).is_none_or(|entry| entry.of != of(*generation))
+        };
+        let old: Vec<usize> = (0..curves.len()).filter(|index| is_old(&curves[*index])).collect();
+        if old.is_empty() || self.job.is_some() {
             return;
         }
-        if entry.of.is_some() && now - entry.made_s < INTERVAL_S {
+        let now = ui.input(|input| input.time);
+        if now - self.started_s < INTERVAL_S {
             return ui.ctx().request_repaint_after(std::time::Duration::from_secs_f64(INTERVAL_S));
         }
-        entry.take(&curve(), range);
-        (entry.of, entry.made_s) = (of, now);
-        entry.generation += 1;
+        self.started_s = now;
+        let mut wanted = Vec::new();
+        for index in old {
+            let (key, generation) = &curves[index];
+            self.entries.entry(key.clone()).or_default().of = of(*generation);
+            wanted.push((key.clone(), snapshot(index)));
+        }
+        let ctx = ui.ctx().clone();
+        let waker: Waker = Arc::new(move || ctx.request_repaint());
+        let work = move |_: &_| {
+            wanted.into_iter().map(|(key, snapshot)| (key, Found::of(&snapshot))).collect::<Vec<_>>()
+        };
+        match Job::start("spectra", &waker, work) {
+            Ok(job) => self.job = Some(job),
+            Err(error) => self.problem = Some(format!("No thread for the spectra: {error}.")),
+        }
+    }
+
+    fn drain(&mut self) {
+        let Some(job) = &mut self.job else { return };
+        match job.poll().1 {
+            Outcome::Running => return,
+            Outcome::Done(all) => {
+                for (key, found) in all {
+                    let entry = self.entries.entry(key).or_default();
+                    entry.found = found;
+                    entry.generation += 1;
+                }
+            }
+            Outcome::Broken => {
+                self.problem = Some("The spectra failed: this is a defect of flqr.".to_owned())
+            }
+        }
+        self.job = None;
     }
 
     /// Takes note of the highest frequency; before the plots.
-    pub(super) fn begin(&mut self) {
-        let ends = self.entries.values().filter_map(|entry| entry.spectrum.frequency_hz.last().copied());
+    pub(super) fn begin(&mut self, ui: &mut Ui) {
+        if let Some(problem) = &self.problem {
+            error_ui(ui, problem);
+        }
+        let ends =
+            self.entries.values().filter_map(|entry| entry.found.spectrum.frequency_hz.last().copied());
         let reach = ends.fold(0.0, f64::max);
         if self.view.follow || (reach - self.reach_hz).abs() > 0.01 * reach {
             self.view.show_all([0.0, reach.max(1e-3)]);
@@ -112,14 +170,15 @@ impl Spectra {
         let measure = self.measure;
         let y_label = label(name, &measure.unit(unit));
         let x_label = last.then_some("frequency [Hz]");
-        let plot = TimePlot { id, label: &y_label, height, x_label, min_y_span: 1.0 };
+        let plot = TimePlot { id, label: &y_label, height, x_label };
         ui.horizontal_top(|ui| {
             let width = (ui.available_width() - PEAK_WIDTH).max(1.0);
             ui.allocate_ui(vec2(width, height), |ui| {
                 let (range, columns) = (self.view.range(), columns(ui));
                 for (key, ..) in curves {
                     if let Some(entry) = self.entries.get_mut(key) {
-                        let (x, y) = (&entry.spectrum.frequency_hz, &entry.logarithms[measure as usize]);
+                        let found = &entry.found;
+                        let (x, y) = (&found.spectrum.frequency_hz, &found.logarithms[measure as usize]);
                         let curve = Curve { x, y, scale: 1.0, gap: f64::INFINITY };
                         entry.caches[measure as usize].visible(curve, entry.generation, range, columns);
                     }
@@ -150,11 +209,12 @@ impl Spectra {
         ui.label(RichText::new(name).small().weak());
         for (key, name, color) in curves {
             let Some(entry) = self.entries.get(key) else { continue };
-            if let Some(problem) = entry.problem {
+            let spectrum = &entry.found.spectrum;
+            let waits = (entry.generation == 0).then_some("at work");
+            if let Some(problem) = entry.found.problem.or(waits) {
                 ui.label(RichText::new(problem).small().weak());
                 continue;
             }
-            let spectrum = &entry.spectrum;
             let values = match self.measure {
                 Measure::Amplitude => &spectrum.amplitude,
                 Measure::Density => &spectrum.density,
@@ -172,21 +232,20 @@ impl Spectra {
     }
 }
 
-impl Entry {
-    /// Of the longest part of the visible range without a gap.
-    fn take(&mut self, curve: &Indexed<'_>, range: [f64; 2]) {
-        let run = curve.longest_run(curve.inside(range));
-        let values: Vec<f64> = run.clone().map(|index| curve.y(index)).collect();
-        let rate_hz = if run.len() > 1 {
-            (run.len() - 1) as f64 / (curve.x(run.end - 1) - curve.x(run.start))
-        } else {
-            f64::NAN
+impl Found {
+    /// Of a curve without gaps at an even rate.
+    fn of(curve: &Snapshot) -> Self {
+        let values: Vec<f64> = (0..curve.len()).map(|index| curve.y(index)).collect();
+        let rate_hz = match curve.len() {
+            0 | 1 => f64::NAN,
+            length => (length - 1) as f64 / (curve.x(length - 1) - curve.x(0)),
         };
         let found = Spectrum::of(&values, rate_hz);
-        self.problem = found.is_none().then_some("too few samples");
-        self.spectrum = found.unwrap_or_default();
+        let problem = found.is_none().then_some("too few samples");
+        let spectrum = found.unwrap_or_default();
         // What is exactly nothing has no logarithm, and is a gap.
-        self.logarithms = [&self.spectrum.amplitude, &self.spectrum.density]
-            .map(|all| all.iter().map(|v| v.log10()).collect());
+        let logarithms =
+            [&spectrum.amplitude, &spectrum.density].map(|all| all.iter().map(|v| v.log10()).collect());
+        Self { spectrum, logarithms, problem }
     }
 }

@@ -4,8 +4,6 @@ use egui::{Color32, Ui};
 use egui_plot::{HLine, Line, LineStyle, Plot, PlotPoint, PlotPoints, PlotResponse, PlotUi};
 
 use super::axes::{Axes, Extras, Y_AXIS_WIDTH};
-use super::decimate::{Curve, Data, DecimationCache, RangeStatistics, Visible};
-use super::marks::{Marks, Moved};
 use crate::theme::palette;
 
 /// The shortest range that can be zoomed to.
@@ -68,53 +66,15 @@ impl TimeView {
 }
 
 /// One plot of a stack.
-pub struct TimePlot<'a> {
+pub(super) struct TimePlot<'a> {
     /// Distinguishes it from other plots.
-    pub id: &'a str,
+    pub(super) id: &'a str,
     /// Label of the vertical axis, with the unit.
-    pub label: &'a str,
+    pub(super) label: &'a str,
     /// Height in points.
-    pub height: f32,
+    pub(super) height: f32,
     /// Label of the horizontal axis; without one the axis is not drawn (the plot below has it).
-    pub x_label: Option<&'a str>,
-    /// The vertical range is at least this long.
-    pub min_y_span: f64,
-}
-
-/// One curve of a plot.
-pub struct TimeCurve<'a> {
-    /// Colour of the line.
-    pub color: Color32,
-    /// Its data.
-    pub curve: Curve<'a>,
-    /// Changes whenever the data do.
-    pub generation: u64,
-    /// What was drawn last.
-    pub cache: &'a mut DecimationCache,
-}
-
-/// One curve of a plot, wherever its data are.
-pub struct DataCurve<'a> {
-    /// Colour of the line.
-    pub color: Color32,
-    /// Its data.
-    pub data: Data<'a>,
-    /// The plot shows the values times this.
-    pub scale: f64,
-    /// A larger step in time is drawn as a gap.
-    pub gap: f64,
-    /// Changes whenever the data do.
-    pub generation: u64,
-    /// What was drawn last.
-    pub cache: &'a mut DecimationCache,
-}
-
-impl TimeCurve<'_> {
-    fn data(&mut self) -> DataCurve<'_> {
-        let Curve { x, y, scale, gap } = self.curve;
-        let (color, generation) = (self.color, self.generation);
-        DataCurve { color, data: Data::Fixed(x, y), scale, gap, generation, cache: self.cache }
-    }
+    pub(super) x_label: Option<&'a str>,
 }
 
 /// What one plot shows.
@@ -128,66 +88,7 @@ pub(super) struct Drawing<'a> {
     pub(super) extras: Extras,
 }
 
-impl<'a> Drawing<'a> {
-    fn of(
-        curves: impl Iterator<Item = DataCurve<'a>>,
-        range: [f64; 2],
-        columns: usize,
-        min_span: f64,
-    ) -> (Self, Vec<Option<RangeStatistics>>) {
-        let drawn = curves.map(|DataCurve { color, data, scale, gap, generation, cache }| {
-            (color, cache.visible_of(data, [scale, gap], generation, range, columns))
-        });
-        let drawn: Vec<(Color32, &Visible)> = drawn.collect();
-        let statistics: Vec<_> = drawn.iter().map(|(_, visible)| visible.statistics).collect();
-        let y_range = y_range(statistics.iter().flatten().map(|s| [s.min, s.max]), min_span);
-        let lines = drawn.into_iter().map(|(color, visible)| (color, visible.pieces.as_slice())).collect();
-        (Self { lines, y_range, ..Self::default() }, statistics)
-    }
-}
-
 impl TimePlot<'_> {
-    /// Draws the curves over the view's range, lets the user pan (drag), zoom (wheel) and resume following
-    /// (double click), and returns the statistics of what is visible of each curve.
-    pub fn show(
-        &self,
-        ui: &mut Ui,
-        view: &mut TimeView,
-        curves: &mut [TimeCurve<'_>],
-    ) -> Vec<Option<RangeStatistics>> {
-        self.show_data(ui, view, curves.iter_mut().map(TimeCurve::data))
-    }
-
-    /// The same of curves whose data may grow.
-    pub fn show_data<'a>(
-        &self,
-        ui: &mut Ui,
-        view: &mut TimeView,
-        curves: impl Iterator<Item = DataCurve<'a>>,
-    ) -> Vec<Option<RangeStatistics>> {
-        let (drawing, statistics) = Drawing::of(curves, view.range(), columns(ui), self.min_y_span);
-        let shown = self.draw(ui, view.range(), &drawing, |_| {});
-        interact(ui, &shown, view, true);
-        statistics
-    }
-
-    /// The same with marks, which come first when something is dragged; also says what the user did to them.
-    pub fn show_marked(
-        &self,
-        ui: &mut Ui,
-        view: &mut TimeView,
-        curves: &mut [TimeCurve<'_>],
-        marks: &mut Marks,
-    ) -> Moved {
-        let color = ui.visuals().strong_text_color();
-        let curves = curves.iter_mut().map(TimeCurve::data);
-        let (drawing, _) = Drawing::of(curves, view.range(), columns(ui), self.min_y_span);
-        let shown = self.draw(ui, view.range(), &drawing, |plot_ui| marks.draw(plot_ui, color));
-        let moved = marks.interact(ui, &shown.response, &shown.transform);
-        interact(ui, &shown, view, !marks.held());
-        moved
-    }
-
     pub(super) fn draw(
         &self,
         ui: &mut Ui,

@@ -1,14 +1,13 @@
 //! Whether the logs can answer.
 
-use egui::{RichText, Ui};
+use egui::Ui;
 use flqr_core::record::{HealthFinding, Severity};
 
 use super::run::Run;
 use super::sources::Sources;
 use super::strip::{StepState, Tone};
-use crate::health_card::{findings_ui, line_problems_ui};
-use crate::theme::palette;
-use crate::widgets::{error_ui, hint_ui, section_ui};
+use crate::health_card::{findings_ui, log_ui};
+use crate::widgets::{empty_page_ui, error_ui, section_ui};
 
 /// What the last answer says of the logs beyond what loading them said.
 fn of_answer<'a>(run: &'a Run, sources: &Sources) -> Vec<&'a HealthFinding> {
@@ -58,10 +57,9 @@ pub(super) fn state(run: &Run, sources: &Sources) -> StepState {
 
 pub(super) fn ui(run: &Run, sources: &Sources, ui: &mut Ui) {
     if sources.list.is_empty() {
-        empty_ui(ui);
-        return;
+        let hint = "Add logs of the machine that the open model describes: the search finds what the model lacks, and how far it is off before and after.";
+        return empty_page_ui(ui, "No log yet.", hint, |_| {});
     }
-    let colors = palette(ui.visuals());
     let of_answer = of_answer(run, sources);
     if !of_answer.is_empty() {
         section_ui(ui, "What the search says of the data", |_| {});
@@ -74,25 +72,6 @@ pub(super) fn ui(run: &Run, sources: &Sources, ui: &mut Ui) {
             error_ui(ui, problem);
         }
         let Some(loaded) = source.loader.log() else { continue };
-        if let Err(problem) = &loaded.kind {
-            error_ui(ui, problem);
-        }
-        let harmless = loaded.health.iter().all(|finding| finding.severity == Severity::Info);
-        if harmless && loaded.kind.is_ok() && loaded.log.problem_count == 0 {
-            ui.label(RichText::new("nothing wrong was found").small().color(colors.good));
-        }
-        line_problems_ui(loaded, ui);
-        findings_ui(&loaded.health, ui);
+        log_ui(loaded, ui);
     }
-}
-
-fn empty_ui(ui: &mut Ui) {
-    ui.add_space(0.3 * ui.available_height());
-    ui.vertical_centered(|ui| {
-        ui.label("No log yet.");
-        hint_ui(
-            ui,
-            "Add logs of the machine that the open model describes: the search finds what the model lacks, and how far it is off before and after.",
-        );
-    });
 }

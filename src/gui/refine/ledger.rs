@@ -1,12 +1,18 @@
 //! A refinement as a row of the ledger.
 
 use super::RefineTab;
-use crate::runs::{Run, RunKind, Value};
+use crate::runs::{Run, RunKind, RunsTab, Value};
 use crate::widgets::shown;
 
 impl RefineTab {
-    /// The row of a refinement that has just ended.
-    pub(crate) fn take_finished(&mut self) -> Option<Run> {
+    /// Gives a refinement that has just ended its row.
+    pub(crate) fn note_run(&mut self, ledger: &mut RunsTab) {
+        if let Some(row) = self.finished() {
+            self.row = Some(Run { number: ledger.note(row.clone()), ..row });
+        }
+    }
+
+    fn finished(&mut self) -> Option<Run> {
         let refined = self.run.refined.as_ref().filter(|refined| self.noted != Some(refined.generation))?;
         self.noted = Some(refined.generation);
         let (made, found) = (&refined.made, &refined.answer);

@@ -26,15 +26,16 @@ use crate::command::Command;
 use crate::context::ViewContext;
 use crate::job::Waker;
 use crate::panes::{Pane, panes_ui};
+use crate::runs::Run as LedgerRow;
+use crate::save_form::{FileKind, SaveForm};
 use crate::session::Session;
 use crate::theme::palette;
-use crate::widgets::{hint_ui, section_ui, warning_ui};
+use crate::widgets::{empty_page_ui, hint_ui, section_ui, warning_ui};
 pub(crate) use command::{RefineCommand, RefineFile};
 use residual::ResidualStep;
 pub(crate) use run::Question;
 use run::{Answered, Drained, Made, Run, Settings, is_of_demo};
 pub(crate) use save::SavedAs;
-use save::Saver;
 use sources::Sources;
 use strip::{Step, StepState, Tone};
 
@@ -43,7 +44,7 @@ pub(crate) struct RefineTab {
     sources: Sources,
     settings: Settings,
     run: Run,
-    saver: Saver,
+    saver: SaveForm<SavedAs>,
     step: Step,
     residual: ResidualStep,
     /// Of each effect that was found, whether it is to be added.
@@ -54,6 +55,8 @@ pub(crate) struct RefineTab {
     chosen: Option<Model>,
     /// The refinement that the ledger has.
     noted: Option<u64>,
+    /// Its row.
+    row: Option<LedgerRow>,
 }
 
 /// What the page's commands may use of the window.
@@ -90,13 +93,14 @@ impl RefineTab {
             sources: Sources::new(column_map),
             settings: Settings::default(),
             run: Run::default(),
-            saver: Saver::default(),
+            saver: SaveForm::default(),
             step: Step::default(),
             residual: ResidualStep::default(),
             ticks: Vec::new(),
             ticked: 0,
             chosen: None,
             noted: None,
+            row: None,
         }
     }
 
@@ -231,6 +235,7 @@ impl RefineTab {
         let mut document = refined.answer.document.clone();
         let model = self.chosen.clone().unwrap_or_else(|| refined.answer.model.clone());
         let said = remark.clone();
+        let row = self.row.as_ref().map(LedgerRow::provenance);
         let left_out = self.left_out().join(", ");
         let content = move || match saved_as {
             SavedAs::Report => {
@@ -238,17 +243,22 @@ impl RefineTab {
                     let text = format!("{left_out}: not taken over into the model");
                     document.blocks.insert(0, Block::notice(ReportTone::Note, "Left out", text));
                 }
+                if let Some(row) = row {
+                    document.blocks.push(Block::paragraph(format!("In the ledger of the session: {row}.")));
+                }
                 if let Some(remark) = said {
                     document.blocks.insert(0, Block::notice(ReportTone::Warning, "Stale", remark));
                 }
                 document.to_html()
             }
             SavedAs::Model => {
-                let remark = said.map(|remark| format!("# {remark}\n")).unwrap_or_default();
-                remark + &model.to_toml()
+                let comments = row.into_iter().chain(said).map(|comment| format!("# {comment}\n"));
+                comments.collect::<String>() + &model.to_toml()
             }
         };
-        self.saver.start((saved_as, path, replace), content, remark, around.waker)
+        let path = self.saver.begin(saved_as, path);
+        let files = move |path: &Path| Ok(vec![(path.to_owned(), content().into_bytes())]);
+        self.saver.write((saved_as, path, replace), files, remark, around.waker)
     }
 
     /// Name that a dialog offers.
@@ -325,7 +335,7 @@ impl RefineTab {
                 form::ui(context, &mut self.settings, &self.sources, &self.run, ui);
                 self.commands_ui(context, ui);
                 if self.run.refined.is_some() {
-                    self.saver.ui(context, ui);
+                    save::ui(&mut self.saver, context, ui);
                 }
             }
             Part::Step => self.step_pane_ui(context, ui),
@@ -335,7 +345,9 @@ impl RefineTab {
     fn step_pane_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
         self.stale_ui(context, ui);
         if self.step == Step::Residual && (self.run.refined.is_some() || self.run.residual.is_some()) {
-            self.residual.ui(self.run.refined.as_ref(), self.run.residual.as_ref(), ui);
+            let sources: Vec<String> = self.row.iter().map(LedgerRow::provenance).collect();
+            let (refined, residual) = (self.run.refined.as_ref(), self.run.residual.as_ref());
+            self.residual.ui(refined, residual, &sources, context.commands, ui);
         } else {
             ScrollArea::both().auto_shrink(false).show(ui, |ui| self.step_ui(context, ui));
         }
@@ -377,7 +389,10 @@ impl RefineTab {
     fn step_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
         match (self.step, self.found()) {
             (Step::Health, _) => health::ui(&self.run, &self.sources, ui),
-            (Step::Residual, _) | (_, None) => nothing_yet_ui(ui),
+            (Step::Residual, _) | (_, None) => {
+                let hint = "Add a log at the left and press “Find what is missing”.";
+                empty_page_ui(ui, "Nothing was searched yet.", hint, |_| {});
+            }
             (Step::Candidates, Some(found)) => candidates::ui(found, ui),
             (Step::Add, Some(_)) => self.add_ui(context, ui),
             (Step::Compare, Some(found)) => compare::ui(found, ui),
@@ -460,13 +475,5 @@ fn use_ui(context: &ViewContext<'_>, standing: Option<Standing>, ticked: bool, u
             }
             _ => {}
         }
-    });
-}
-
-fn nothing_yet_ui(ui: &mut Ui) {
-    ui.add_space(0.3 * ui.available_height());
-    ui.vertical_centered(|ui| {
-        ui.label("Nothing was searched yet.");
-        hint_ui(ui, "Add a log at the left and press “Find what is missing”.");
     });
 }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use egui::{RichText, TextEdit, Ui};
-use flqr_core::record::{Log, LogKind, Mapping};
+use flqr_core::record::{Log, Mapping};
 
 use super::command::{RefineCommand, RefineFile};
 use crate::column_map::ColumnMapForm;
@@ -13,7 +13,7 @@ use crate::context::ViewContext;
 use crate::health_card::progress_ui;
 use crate::job::Waker;
 use crate::load::{LoadedLog, Loader};
-use crate::widgets::{error_ui, hint_ui, section_ui, shown, warning_ui};
+use crate::widgets::{error_ui, hint_ui, section_ui, warning_ui};
 
 /// A log of the list.
 pub(super) struct Source {
@@ -270,19 +270,7 @@ impl Source {
             }
         }
         if let Some(loaded) = self.loader.log() {
-            hint_ui(ui, summary(loaded));
+            hint_ui(ui, loaded.summary());
         }
     }
-}
-
-fn summary(loaded: &LoadedLog) -> String {
-    let kind = match &loaded.kind {
-        Ok(LogKind::Bench) => "bench log of one motor",
-        Ok(LogKind::LinearAxis) => "log of a linear axis",
-        Ok(LogKind::Robot) => "robot log",
-        Ok(LogKind::FrictionPairs) => "friction pairs",
-        Err(_) => "unknown kind",
-    };
-    let rate = loaded.rate_hz.map(|rate| format!(", {} Hz", shown(rate, 4))).unwrap_or_default();
-    format!("{kind}: {} rows{rate}", loaded.log.rows())
 }

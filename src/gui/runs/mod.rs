@@ -17,7 +17,7 @@ use flqr_core::model_file::Model;
 
 use crate::context::ViewContext;
 use crate::panes::{Pane, panes_ui};
-use crate::widgets::hint_ui;
+use crate::widgets::empty_page_ui;
 use changes::Changes;
 pub(crate) use command::RunsCommand;
 use overlay::Overlay;
@@ -127,7 +127,10 @@ impl RunsTab {
     pub(crate) fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
         let frame = Frame::central_panel(ui.style()).inner_margin(Margin::symmetric(10, 6));
         if self.ledger.rows().is_empty() && self.deleted.is_empty() {
-            CentralPanel::default().frame(frame).show(ui, empty_ui);
+            let hint = "Every experiment, fit, refinement and recording becomes a row here, with a number that goes with all that is exported of it.";
+            CentralPanel::default()
+                .frame(frame)
+                .show(ui, |ui| empty_page_ui(ui, "No run yet.", hint, |_| {}));
             return;
         }
         let height = (0.42 * ui.available_height()).max(140.0);
@@ -145,7 +148,7 @@ impl RunsTab {
             Pane::right(Part::Changes, "What changed", 360.0, 240.0..=640.0),
         ];
         panes_ui(ui, "runs", &panes, |part, ui| match part {
-            Part::Overlay => self.overlay.ui(&self.ledger, &self.ticked, ui),
+            Part::Overlay => self.overlay.ui(&self.ledger, &self.ticked, context.commands, ui),
             Part::Changes => self.changes.ui(&self.ledger, ui),
         });
     }
@@ -161,15 +164,4 @@ enum Part {
 fn listed(numbers: impl Iterator<Item = u64>) -> String {
     let numbers: Vec<String> = numbers.map(|number| number.to_string()).collect();
     format!("{} {}", if numbers.len() == 1 { "run" } else { "runs" }, numbers.join(", "))
-}
-
-fn empty_ui(ui: &mut Ui) {
-    ui.add_space(0.35 * ui.available_height());
-    ui.vertical_centered(|ui| {
-        ui.label("No run yet.");
-        hint_ui(
-            ui,
-            "Every experiment, fit, refinement and recording becomes a row here, with a number that goes with all that is exported of it.",
-        );
-    });
 }

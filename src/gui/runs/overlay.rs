@@ -4,19 +4,21 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use egui::{Button, Color32, ComboBox, Grid, Sense, Stroke, Ui, vec2};
-use egui_plot::{Line, Plot, PlotPoint, PlotPoints};
 use flqr_core::record::{Signal, best_alignment, first_crossing_s};
 
 use super::run::{Ledger, Run, Series};
+use crate::command::Commands;
 use crate::job::{Job, Outcome, Waker};
-use crate::plot::Axes;
+use crate::plot::{Data, Panel, PanelCurve, Stack, Unit};
 use crate::theme::palette;
 use crate::widgets::{choice_ui, hint_ui, mono, number_ui, section_ui, shown, warning_ui};
 
 /// Why a row cannot be drawn.
 pub(super) const NO_SERIES: &str = "This row has no curves in memory: it is compared by its values alone";
-/// Points of a drawn curve, about.
-const POINTS: usize = 2400;
+/// A step in time this many times longer than the usual one is drawn as a gap.
+const GAP: f64 = 10.0;
+/// The plot is at least this high, with its axis.
+const LEAST_HEIGHT: f32 = 130.0;
 /// Height of the table below the plot, of one row.
 const ROW_HEIGHT: f32 = 24.0;
 
@@ -24,8 +26,12 @@ const ROW_HEIGHT: f32 = 24.0;
 type Found = Vec<(u64, Option<f64>)>;
 
 /// How the rows are drawn.
-#[derive(Default)]
 pub(super) struct Overlay {
+    stack: Stack,
+    /// What is drawn of the rows by their numbers, made anew only where it changes.
+    curves: BTreeMap<u64, Curve>,
+    /// Curves that were made.
+    made: u64,
     channel: String,
     shifts_s: BTreeMap<u64, f64>,
     /// The row that a drag moves; none: the view.
@@ -34,6 +40,66 @@ pub(super) struct Overlay {
     level: f64,
     job: Option<Job<(), Found>>,
     problem: Option<String>,
+}
+
+impl Default for Overlay {
+    fn default() -> Self {
+        Self {
+            stack: Stack::new("overlay", 60.0),
+            curves: BTreeMap::new(),
+            made: 0,
+            channel: String::new(),
+            shifts_s: BTreeMap::new(),
+            dragged: None,
+            level: 0.0,
+            job: None,
+            problem: None,
+        }
+    }
+}
+
+/// A signal of a row at its shifted times.
+struct Curve {
+    series: Arc<Series>,
+    channel: usize,
+    shift_s: f64,
+    time_s: Vec<f64>,
+    /// Smallest, largest, mean and standard deviation of what is finite.
+    statistics: [f64; 4],
+    generation: u64,
+}
+
+impl Curve {
+    fn new(row: &Drawn<'_>, shift_s: f64, generation: u64) -> Self {
+        let Signal { time_s, values } = row.signal();
+        Self {
+            series: Arc::clone(row.series),
+            channel: row.channel,
+            shift_s,
+            time_s: time_s.iter().map(|time| time + shift_s).collect(),
+            statistics: statistics(values),
+            generation,
+        }
+    }
+
+    fn is_of(&self, row: &Drawn<'_>, shift_s: f64) -> bool {
+        Arc::ptr_eq(&self.series, row.series) && (self.channel, self.shift_s) == (row.channel, shift_s)
+    }
+
+    fn values(&self) -> &[f64] {
+        &self.series.channels[self.channel].values
+    }
+
+    /// First and last time.
+    fn ends(&self) -> [f64; 2] {
+        [self.time_s.first(), self.time_s.last()].map(|time| time.copied().unwrap_or(0.0))
+    }
+
+    /// A longer step is a gap.
+    fn gap_s(&self) -> f64 {
+        let [start, end] = self.ends();
+        GAP * (end - start) / self.time_s.len().max(2) as f64
+    }
 }
 
 /// A row that is drawn.
@@ -45,6 +111,17 @@ struct Drawn<'a> {
 }
 
 impl Drawn<'_> {
+    fn channel(&self) -> &super::Channel {
+        &self.series.channels[self.channel]
+    }
+
+    /// Column of an export.
+    fn key(&self) -> String {
+        let channel = self.channel();
+        let unit = channel.unit.replace([' ', '/', '²', '°'], "_");
+        format!("run_{}_{}_{unit}", self.run.number, channel.name.replace(' ', "_"))
+    }
+
     fn signal(&self) -> Signal<'_> {
         Signal { time_s: &self.series.time_s, values: &self.series.channels[self.channel].values }
     }
@@ -55,7 +132,7 @@ impl Overlay {
         &self.shifts_s
     }
 
-    pub(super) fn ui(&mut self, ledger: &Ledger, ticked: &BTreeSet<u64>, ui: &mut Ui) {
+    pub(super) fn ui(&mut self, ledger: &Ledger, ticked: &BTreeSet<u64>, commands: &Commands, ui: &mut Ui) {
         self.drain();
         let names = channels(ledger, ticked);
         if !names.contains(&self.channel) {
@@ -71,9 +148,9 @@ impl Overlay {
         if let Some(problem) = &self.problem {
             warning_ui(ui, problem);
         }
-        let table = ROW_HEIGHT * (1 + drawn.len().min(5)) as f32;
-        let height = (ui.available_height() - table - 12.0).max(80.0);
-        self.plot_ui(&drawn, height, ui);
+        let table = ROW_HEIGHT * (2 + drawn.len().min(5)) as f32;
+        self.make_curves(&drawn);
+        self.plot_ui(&drawn, table + 12.0, commands, ui);
         egui::ScrollArea::vertical().id_salt("drawn").show(ui, |ui| self.rows_ui(&drawn, ui));
     }
 
@@ -188,29 +265,53 @@ impl Overlay {
         }
     }
 
-    fn plot_ui(&mut self, drawn: &[Drawn<'_>], height: f32, ui: &mut Ui) {
-        let moves_view = self.dragged.is_none();
-        let axes = Axes { x_label: Some("time [s]"), y_label: &self.channel, x_lines: 8.0, y_lines: 5.0 };
-        let plot = Plot::new("run overlay")
-            .height(height)
-            .allow_drag([moves_view, false])
-            .allow_zoom([true, false])
-            .allow_scroll(false)
-            .allow_boxed_zoom(false)
-            .allow_axis_zoom_drag(false);
-        let shown = axes.on(plot, ui.visuals()).show(ui, |plot_ui| {
-            let bounds = plot_ui.plot_bounds();
-            let visible = [bounds.min()[0], bounds.max()[0]];
-            for row in drawn {
-                let shift_s = self.shifts_s.get(&row.run.number).copied().unwrap_or(0.0);
-                let points = thinned(row.signal(), shift_s, visible);
-                let line = Line::new(format!("run {}", row.run.number), PlotPoints::Owned(points));
-                plot_ui.line(line.color(row.color).width(1.6).allow_hover(false));
+    fn make_curves(&mut self, drawn: &[Drawn<'_>]) {
+        self.curves.retain(|number, _| drawn.iter().any(|row| row.run.number == *number));
+        for row in drawn {
+            let number = row.run.number;
+            let shift_s = self.shifts_s.get(&number).copied().unwrap_or(0.0);
+            if self.curves.get(&number).is_none_or(|curve| !curve.is_of(row, shift_s)) {
+                self.made += 1;
+                self.curves.insert(number, Curve::new(row, shift_s, self.made));
             }
-            f64::from(plot_ui.pointer_coordinate_drag_delta().x)
+        }
+    }
+
+    /// `below` is the room for what comes after the plot.
+    fn plot_ui(&mut self, drawn: &[Drawn<'_>], below: f32, commands: &Commands, ui: &mut Ui) {
+        let Self { stack, curves, dragged, .. } = self;
+        let panel_curve = |row: &Drawn<'_>| {
+            let number = row.run.number;
+            let curve = curves.get(&number)?;
+            let data = Data::Fixed(&curve.time_s, curve.values());
+            let (name, key) = (format!("run {number}").into(), row.key().into());
+            let (generation, gap) = (curve.generation, curve.gap_s());
+            Some(PanelCurve { name, key, color: row.color, data, generation, gap })
+        };
+        let Some(channel) = drawn.first().map(Drawn::channel) else { return };
+        let panel = Panel {
+            name: channel.name.into(),
+            unit: Unit::Plain(channel.unit),
+            min_span: 1e-6,
+            shown: true,
+            curves: drawn.iter().filter_map(panel_curve).collect(),
+            limits: Vec::new(),
+        };
+        let ends = curves.values().map(Curve::ends);
+        let limits = ends.reduce(|all, one| [all[0].min(one[0]), all[1].max(one[1])]);
+        stack.update(limits.unwrap_or([0.0, 1.0]));
+        stack.drag_moves_curve = dragged.is_some();
+        stack.sources = drawn.iter().map(|row| provenance(row.run, curves)).collect();
+        ui.horizontal_wrapped(|ui| stack.tools_ui(ui, std::slice::from_ref(&panel)));
+        let size = vec2(ui.available_width(), (ui.available_height() - below).max(LEAST_HEIGHT));
+        let wishes = ui.allocate_ui(size, |ui| {
+            ui.set_min_height(size.y);
+            stack.show(ui, &[panel])
         });
-        if let Some(number) = self.dragged.filter(|_| shown.response.dragged() && shown.inner != 0.0) {
-            *self.shifts_s.entry(number).or_default() += shown.inner;
+        let shift_s = wishes.inner.shift;
+        wishes.inner.send(commands);
+        if let Some(number) = dragged.filter(|_| shift_s != 0.0) {
+            *self.shifts_s.entry(number).or_default() += shift_s;
         }
     }
 
@@ -259,7 +360,7 @@ impl Overlay {
         if shift_s != before {
             self.shifts_s.insert(number, shift_s);
         }
-        for value in statistics(row.signal().values) {
+        for value in self.curves.get(&number).map_or([f64::NAN; 4], |curve| curve.statistics) {
             ui.label(mono(shown(value, 4)));
         }
         ui.label(mono(shown(row.series.time_s.last().copied().unwrap_or(f64::NAN), 4)));
@@ -313,63 +414,16 @@ fn key(ui: &mut Ui, color: Color32) {
     ui.painter().hline(rect.x_range(), rect.center().y, Stroke::new(2.5, color));
 }
 
-/// What is visible of a signal, with the smallest and largest value of each of its parts.
-fn thinned(signal: Signal<'_>, shift_s: f64, visible: [f64; 2]) -> Vec<PlotPoint> {
-    let time_s = signal.time_s;
-    let all = [time_s.first(), time_s.last()].map(|time| time.copied().unwrap_or(0.0) + shift_s);
-    // Before the first frame, and after a double click, the plot takes its range from the points.
-    let inside = visible[0] < all[1] && visible[1] > all[0];
-    let range = if inside {
-        let from = time_s.partition_point(|time| time + shift_s < visible[0]).saturating_sub(1);
-        let to = (time_s.partition_point(|time| time + shift_s <= visible[1]) + 1).min(time_s.len());
-        from..to
-    } else {
-        0..time_s.len()
-    };
-    let part = range.len().div_ceil(POINTS / 2).max(1);
-    let mut points = Vec::with_capacity(POINTS + 4);
-    let mut add = |index: usize| {
-        let (time, value) = (time_s[index] + shift_s, signal.values[index]);
-        if time.is_finite() && value.is_finite() {
-            points.push(PlotPoint::new(time, value));
-        }
-    };
-    // The ends keep the range that a double click shows.
-    add(0);
-    for start in range.clone().step_by(part) {
-        let indices = start..(start + part).min(range.end);
-        let by_value = |a: &usize, b: &usize| signal.values[*a].total_cmp(&signal.values[*b]);
-        let (Some(low), Some(high)) = (indices.clone().min_by(by_value), indices.max_by(by_value)) else {
-            continue;
-        };
-        add(low.min(high));
-        if low != high {
-            add(low.max(high));
-        }
-    }
-    add(time_s.len() - 1);
-    points
+/// What an export says of a row.
+fn provenance(run: &Run, curves: &BTreeMap<u64, Curve>) -> String {
+    let shift_s = curves.get(&run.number).map_or(0.0, |curve| curve.shift_s);
+    let shifted = if shift_s == 0.0 { String::new() } else { format!(", shifted by {shift_s} s") };
+    run.provenance() + &shifted
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_thinned_curve_keeps_its_peaks_and_its_ends() {
-        let time_s: Vec<f64> = (0..60_000).map(|index| f64::from(index) * 1e-3).collect();
-        let mut values = vec![0.0; 60_000];
-        (values[12_345], values[44_444]) = (7.0, -3.0);
-        values[20_000] = f64::NAN;
-        let points = thinned(Signal { time_s: &time_s, values: &values }, 5.0, [0.0, 100.0]);
-        assert!(points.len() < 2 * POINTS);
-        let extreme = |pick: fn(f64, f64) -> f64| points.iter().map(|point| point.y).fold(0.0, pick);
-        assert_eq!((extreme(f64::max), extreme(f64::min)), (7.0, -3.0));
-        assert_eq!((points[0].x, points[points.len() - 1].x), (5.0, 64.999));
-        assert!(points.windows(2).all(|pair| pair[0].x <= pair[1].x));
-        let part = thinned(Signal { time_s: &time_s, values: &values }, 0.0, [12.0, 12.5]);
-        assert!(part.iter().filter(|point| (12.0..=12.5).contains(&point.x)).count() >= 500);
-    }
 
     #[test]
     fn statistics_leave_out_what_is_no_number() {

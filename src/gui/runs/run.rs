@@ -297,6 +297,10 @@ impl Sources {
         logs.into_iter().for_each(|log| hash.log(log));
         Self(hash.hex())
     }
+
+    pub(crate) fn hex(&self) -> &str {
+        &self.0
+    }
 }
 
 /// A 64-bit hash that is the same on all machines: FNV-1a over bytes, and over numbers as words.

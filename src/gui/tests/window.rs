@@ -588,7 +588,7 @@ fn gaps_are_drawn_zoomed_out_and_in() {
 
 #[test]
 fn every_page_survives_any_size() {
-    for tab in [Tab::Tune, Tab::Friction, Tab::Experiments, Tab::Robot] {
+    for tab in Tab::ALL {
         for size in [Vec2::ZERO, vec2(1.0, 1.0), vec2(300.0, 200.0), vec2(1920.0, 1080.0)] {
             open(options(tab), size).run_steps(3);
         }
@@ -597,7 +597,7 @@ fn every_page_survives_any_size() {
 
 #[test]
 fn a_hundred_frames_of_random_input_do_no_harm() {
-    for (tab, seed) in [(Tab::Tune, 1), (Tab::Friction, 2), (Tab::Robot, 4)] {
+    for (tab, seed) in Tab::ALL.into_iter().zip(1..) {
         random_input(&mut open(WindowOptions { paused: false, ..options(tab) }, SIZE), seed);
     }
 }

@@ -10,6 +10,7 @@ use crate::context::ViewContext;
 use crate::history::{Channel, HISTORY_S};
 use crate::plot::{Data, Panel, PanelCurve, Stack, TimeView, Unit};
 use crate::quantity::Quantity;
+use crate::runs::Sources;
 use crate::theme::palette;
 use crate::widgets::{error_ui, hint_ui, number_ui, warning_ui};
 
@@ -72,6 +73,9 @@ impl LivePlots {
         }
         if history.dropped() > 0 {
             hint_ui(ui, format!("The oldest {} samples were dropped: 2 h are kept.", history.dropped()));
+        }
+        if self.stack.exports() {
+            self.stack.sources = vec![source(context)];
         }
         self.stack.show(ui, &panels).send(context.commands);
     }
@@ -161,6 +165,13 @@ fn panels<'a>(context: &ViewContext<'a>, ui: &Ui) -> Vec<Panel<'a>> {
         }
     };
     Channel::ALL.into_iter().enumerate().map(panel).collect()
+}
+
+/// Where the curves come from, for exports: they are no run of the ledger.
+fn source(context: &ViewContext<'_>) -> String {
+    let model = context.session.model();
+    let sources = Sources::new(Some(&model), []);
+    format!("live plots, {}: model {}, sources {}", context.source.name(), model.name, sources.hex())
 }
 
 fn run_ui(context: &ViewContext<'_>, ui: &mut Ui) {

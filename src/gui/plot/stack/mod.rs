@@ -1,34 +1,24 @@
 //! Plots below each other over one time axis, with all their tools: a page hands over what there is to plot, and gets
 //! cursors, readings, statistics, spectra, a second axis, units, limits and exports by one call.
 
+mod content;
+mod rows;
+mod tools;
+mod words;
+
 use std::borrow::Cow;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-use egui::{Color32, EventFilter, Key, Modifiers, Rect, RichText, Ui, vec2};
-use egui_plot::{PlotPoint, PlotResponse};
+use egui::{Color32, Key, Modifiers, Rect, Ui};
 
-use super::axes::{Extras, Right, SecondAxis};
 use super::cursors::{Cursors, steps};
-use super::decimate::{Data, DecimationCache, Indexed, RangeStatistics};
-use super::export::{Content, Export, FigureFile, FigureKind};
-use super::figure;
+use super::decimate::{Data, DecimationCache, Indexed};
+use super::export::{Export, FigureFile};
 use super::marks::{Marks, Moved};
-use super::readout::{Reading, readout_ui};
-use super::spectra::{Measure, Spectra};
-use super::unit::{Unit, UnitChoice, label};
-use super::view::{Drawing, TimePlot, TimeView, columns, interact, y_range};
+use super::spectra::Spectra;
+use super::unit::{Unit, UnitChoice};
+use super::view::TimeView;
 use crate::command::{Command, Commands, FilePurpose};
-use crate::quantity::to_scale;
-use crate::widgets::{choice_ui, mono};
-
-/// Room for the statistics at the right of each plot.
-const STATISTICS_WIDTH: f32 = 118.0;
-/// The plots alone get a page that is narrower.
-const LEAST_WIDTH_WITH_STATISTICS: f32 = 400.0;
-/// Height of the horizontal axis with its label.
-const X_AXIS_HEIGHT: f32 = 36.0;
-/// Plots are at least this high; more of them scroll.
-const LEAST_HEIGHT: f32 = 30.0;
 
 /// One plot: what it shows, and of which quantity.
 pub struct Panel<'a> {
@@ -84,6 +74,8 @@ pub struct Wishes {
     pub said: Option<String>,
     /// What the user did to marks.
     pub moved: Moved,
+    /// How far a drag has moved a curve, where [`Stack::drag_moves_curve`] is set.
+    pub shift: f64,
 }
 
 impl Wishes {
@@ -111,6 +103,10 @@ pub struct Stack {
     is_live: bool,
     /// Label of the horizontal axis, and the column of it in an exported log.
     pub x: [&'static str; 2],
+    /// Where the curves come from, a line each; every export says so.
+    pub sources: Vec<String>,
+    /// Whether a drag is for a curve, and not for the visible range.
+    pub drag_moves_curve: bool,
     cursors: Option<Cursors>,
     spectra: Option<Spectra>,
     /// Of plots by name: the curve at their right axis, by its key.
@@ -134,32 +130,6 @@ struct Around<'m, 'p> {
     dialog: bool,
 }
 
-/// The room of one plot.
-struct Frame {
-    height: f32,
-    /// Whether the horizontal axis is below it.
-    last: bool,
-    room: Right,
-}
-
-/// A plot and its curves as they are drawn.
-struct Row<'p, 'a> {
-    panel: &'p Panel<'a>,
-    unit: &'static str,
-    scale: f64,
-    statistics: Vec<Option<RangeStatistics>>,
-    y_range: [f64; 2],
-    second: Option<SecondLine>,
-}
-
-struct SecondLine {
-    axis: SecondAxis,
-    color: Color32,
-    pieces: Vec<Vec<PlotPoint>>,
-    /// Number of the curve, where it is one of the plot's own.
-    own: Option<usize>,
-}
-
 impl Stack {
     /// A stack called `name` over time, `span` seconds long.
     pub fn new(name: &'static str, span: f64) -> Self {
@@ -169,6 +139,8 @@ impl Stack {
             units: UnitChoice::default(),
             is_live: false,
             x: ["time [s]", "time_s"],
+            sources: Vec::new(),
+            drag_moves_curve: false,
             cursors: None,
             spectra: None,
             second: BTreeMap::new(),
@@ -225,73 +197,6 @@ impl Stack {
         self.chosen.get(&*panel.name).copied().unwrap_or(panel.shown)
     }
 
-    /// The tools, for a row above the plots.
-    pub fn tools_ui(&mut self, ui: &mut Ui, panels: &[Panel<'_>]) {
-        if self.is_live {
-            ui.toggle_value(&mut self.view.follow, "Follow").on_hover_text(
-                "Keep the newest sample in view (End). Dragging a plot holds it, while recording goes on.",
-            );
-        }
-        let mut on = self.cursors.is_some();
-        let help =
-            "Two cursors on all plots: differences, mean, RMS, peaks, overshoot and settling between them";
-        if ui.toggle_value(&mut on, "Cursors").on_hover_text(help).clicked() {
-            self.cursors = on.then(|| Cursors::within(self.view.range()));
-        }
-        let mut on = self.spectra.is_some();
-        let help = "Amplitude spectrum or spectral density of the visible range, in place of its course";
-        if ui.toggle_value(&mut on, "Spectrum").on_hover_text(help).clicked() {
-            self.spectra = on.then(Spectra::default);
-        }
-        if let Some(spectra) = &mut self.spectra {
-            ui.scope(|ui| choice_ui(ui, &mut spectra.measure, &Measure::ALL));
-        }
-        if panels.len() > 1 {
-            ui.menu_button("Signals", |ui| self.signals_ui(ui, panels))
-                .response
-                .on_hover_text("Choose what is plotted, and what has a second axis");
-        }
-        self.units_ui(ui, panels);
-        ui.toggle_value(&mut self.export.open, "Export")
-            .on_hover_text("Save the visible range as CSV, or the figure as SVG or PNG");
-    }
-
-    fn signals_ui(&mut self, ui: &mut Ui, panels: &[Panel<'_>]) {
-        for panel in panels {
-            let mut shown = self.is_shown(panel);
-            if ui.checkbox(&mut shown, panel.name.as_ref()).changed() {
-                self.chosen.insert(panel.name.to_string(), shown);
-            }
-        }
-        ui.separator();
-        for panel in
-            panels.iter().filter(|panel| self.chosen.get(&*panel.name).copied().unwrap_or(panel.shown))
-        {
-            ui.menu_button(format!("Second axis of {}", panel.name), |ui| {
-                second_axis_ui(ui, &mut self.second, panel, panels);
-            });
-        }
-    }
-
-    fn units_ui(&mut self, ui: &mut Ui, panels: &[Panel<'_>]) {
-        let has = |units: fn(&Unit) -> bool| panels.iter().any(|panel| units(&panel.unit));
-        if has(|unit| matches!(unit, Unit::Angle | Unit::AngularSpeed)) {
-            ui.scope(|ui| {
-                let choices = [(true, "deg", "Angles in degrees"), (false, "rad", "Angles in radians")];
-                choice_ui(ui, &mut self.units.degrees, &choices);
-            });
-        }
-        if has(|unit| matches!(unit, Unit::Torque(Some(_)))) {
-            ui.scope(|ui| {
-                let choices = [
-                    (false, "N m", "Torques"),
-                    (true, "A", "Motor currents, by the torque constant of the model's [link]"),
-                ];
-                choice_ui(ui, &mut self.units.amperes, &choices);
-            });
-        }
-    }
-
     /// The plots over the available room.
     pub fn show(&mut self, ui: &mut Ui, panels: &[Panel<'_>]) -> Wishes {
         self.show_marked(ui, panels, None)
@@ -303,6 +208,7 @@ impl Stack {
         let said = self.export.drain(ui);
         let mut around =
             Around { marks, all: panels, wishes: Wishes { said, ..Wishes::default() }, dialog: asked.dialog };
+        self.forget_others(panels);
         let shown: Vec<&Panel<'_>> = panels.iter().filter(|panel| self.is_shown(panel)).collect();
         self.keys(ui, &shown);
         let top = ui.next_widget_position();
@@ -324,6 +230,21 @@ impl Stack {
         wishes
     }
 
+    /// Whether an export may be asked for, and [`Stack::sources`] is of use.
+    pub fn exports(&self) -> bool {
+        self.export.open
+    }
+
+    /// Curves that are gone leave nothing in memory.
+    fn forget_others(&mut self, panels: &[Panel<'_>]) {
+        if self.caches.len() > panels.iter().map(|panel| panel.curves.len()).sum() {
+            let keys =
+                panels.iter().flat_map(|panel| panel.curves.iter().map(|curve| cache_key(panel, curve)));
+            let keys: BTreeSet<String> = keys.collect();
+            self.caches.retain(|key, _| keys.contains(key));
+        }
+    }
+
     /// End follows the newest sample; the arrows move a cursor.
     fn keys(&mut self, ui: &Ui, shown: &[&Panel<'_>]) {
         let focused = ui.memory(|memory| memory.focused());
@@ -342,350 +263,6 @@ impl Stack {
             let units = self.units;
             cursors.follow_samples(&indexed(&mut self.caches, panel, curve, units), steps);
             self.cursors = Some(cursors);
-        }
-    }
-
-    fn time_ui(&mut self, ui: &mut Ui, shown: &[&Panel<'_>], around: &mut Around<'_, '_>) {
-        let has_statistics = ui.available_width() >= LEAST_WIDTH_WITH_STATISTICS;
-        let beside = if has_statistics { STATISTICS_WIDTH } else { 0.0 };
-        let room = self.room(shown);
-        let readout = if self.cursors.is_some() { self.readout_height } else { 0.0 };
-        let heights = heights(ui, shown.len(), readout);
-        for (number, panel) in shown.iter().enumerate() {
-            let last = number + 1 == shown.len();
-            let height = if last { heights + X_AXIS_HEIGHT } else { heights };
-            ui.horizontal_top(|ui| {
-                let width = (ui.available_width() - beside).max(1.0);
-                let row = ui.allocate_ui(vec2(width, height), |ui| {
-                    let columns = columns(ui);
-                    let row = self.row(panel, around.all, columns, heights);
-                    self.plot_ui(ui, &row, Frame { height, last, room: room.clone() }, around);
-                    row
-                });
-                if has_statistics {
-                    let cursor = around.marks.as_ref().map(|marks| marks.cursor);
-                    ui.vertical(|ui| self.statistics_ui(ui, &row.inner, cursor));
-                }
-            });
-        }
-        if self.cursors.is_some() {
-            let top = ui.next_widget_position().y;
-            self.readout_ui(ui, shown);
-            self.readout_height = ui.next_widget_position().y - top;
-        }
-    }
-
-    /// What every plot has at its right, so that all are equally wide.
-    fn room(&self, shown: &[&Panel<'_>]) -> Right {
-        let any = shown.iter().any(|panel| self.second.contains_key(&*panel.name));
-        if any { Right::Room } else { Right::Nothing }
-    }
-
-    /// Puts together what a plot shows.
-    fn row<'p, 'a>(
-        &mut self,
-        panel: &'p Panel<'a>,
-        all: &[Panel<'_>],
-        columns: usize,
-        height: f32,
-    ) -> Row<'p, 'a> {
-        let (range, units) = (self.view.range(), self.units);
-        let (unit, scale) = panel.shown_unit(units);
-        let key = self.second.get(&*panel.name).cloned();
-        let own = key.as_ref().and_then(|key| panel.curves.iter().position(|curve| *curve.key == **key));
-        let mut statistics = Vec::new();
-        for curve in &panel.curves {
-            let cache = cache(&mut self.caches, panel, curve);
-            let visible = cache.visible_of(curve.data, [scale, curve.gap], curve.generation, range, columns);
-            statistics.push(visible.statistics);
-        }
-        let of_left = |(number, found): (usize, &Option<RangeStatistics>)| {
-            found.filter(|_| own != Some(number)).map(|found| [found.min, found.max])
-        };
-        let ends = statistics.iter().enumerate().filter_map(of_left).collect::<Vec<_>>();
-        let largest = ends.iter().flatten().fold(0.0_f64, |largest, end| largest.max(end.abs()));
-        // A limit far away must not press the curve flat.
-        let near = |(_, limit): &&(&str, f64)| limit.abs() * scale <= 2.0 * largest;
-        let limits =
-            panel.limits.iter().filter(near).map(|(_, limit)| [-limit.abs() * scale, limit.abs() * scale]);
-        let y_range = y_range(ends.iter().copied().chain(limits), panel.min_span * scale);
-        let second = key.and_then(|key| self.second_line(&key, all, own, columns, y_range, height));
-        Row { panel, unit, scale, statistics, y_range, second }
-    }
-
-    fn second_line(
-        &mut self,
-        key: &str,
-        all: &[Panel<'_>],
-        own: Option<usize>,
-        columns: usize,
-        left: [f64; 2],
-        height: f32,
-    ) -> Option<SecondLine> {
-        let (range, units) = (self.view.range(), self.units);
-        let curves = all.iter().flat_map(|panel| panel.curves.iter().map(move |curve| (panel, curve)));
-        let (panel, curve) = curves.into_iter().find(|(_, curve)| curve.key == key)?;
-        let (unit, scale) = panel.shown_unit(units);
-        let cache = cache(&mut self.caches, panel, curve);
-        let visible = cache.visible_of(curve.data, [scale, curve.gap], curve.generation, range, columns);
-        let ends = visible.statistics.map(|found| [found.min, found.max]);
-        let own_range = y_range(ends.into_iter(), panel.min_span * scale);
-        let text = label(&panel.curve_name(curve), unit);
-        let lines = (f64::from(height) / 40.0).max(4.0);
-        let axis = SecondAxis::new(text, curve.color, own_range, left, lines);
-        let place = |point: &PlotPoint| PlotPoint::new(point.x, axis.place(point.y));
-        let pieces = visible.pieces.iter().map(|piece| piece.iter().map(place).collect()).collect();
-        Some(SecondLine { axis, color: curve.color, pieces, own })
-    }
-
-    fn plot_ui(&mut self, ui: &mut Ui, row: &Row<'_, '_>, frame: Frame, around: &mut Around<'_, '_>) {
-        let (panel, Frame { height, last, room }) = (row.panel, frame);
-        let id = plot_id(self.name, panel);
-        let y_label = label(&panel.name, row.unit);
-        let plot = TimePlot {
-            id: &id,
-            label: &y_label,
-            height,
-            x_label: last.then_some(self.x[0]),
-            min_y_span: panel.min_span,
-        };
-        let own = row.second.as_ref().and_then(|second| second.own);
-        let curves = panel.curves.iter().enumerate().filter(|(number, _)| own != Some(*number));
-        let mut lines: Vec<(Color32, &[Vec<PlotPoint>])> = curves
-            .filter_map(|(_, curve)| {
-                let cache = self.caches.get(&cache_key(panel, curve))?;
-                Some((curve.color, cache.last_visible().pieces.as_slice()))
-            })
-            .collect();
-        if let Some(second) = &row.second {
-            lines.push((second.color, second.pieces.as_slice()));
-        }
-        let limits = panel.limits.iter().flat_map(|(name, limit)| {
-            [limit.abs(), -limit.abs()].map(|limit| ((*name).to_owned(), limit * row.scale))
-        });
-        let right = row.second.as_ref().map_or(room, |second| Right::Axis(second.axis.clone()));
-        let extras = Extras { right, logarithmic: false };
-        let drawing = Drawing { lines, y_range: row.y_range, limits: limits.collect(), extras };
-        let color = ui.visuals().strong_text_color();
-        let (cursors, range) = (self.cursors, self.view.range());
-        let shown = plot.draw(ui, range, &drawing, |plot_ui| {
-            if let Some(marks) = &around.marks {
-                marks.draw(plot_ui, color);
-            }
-            if let Some(cursors) = &cursors {
-                cursors.draw(plot_ui, color);
-            }
-        });
-        self.react(ui, &shown, around);
-        shown.response.context_menu(|ui| self.menu_ui(ui, panel, around));
-        shown.response.accessible_name(self.summary(row));
-    }
-
-    /// What the pointer does in a plot.
-    fn react(&mut self, ui: &Ui, shown: &PlotResponse<()>, around: &mut Around<'_, '_>) {
-        let (response, transform) = (&shown.response, &shown.transform);
-        let held = self.cursors.as_mut().is_some_and(|cursors| cursors.interact(ui, response, transform));
-        let mut marked = false;
-        if let (Some(marks), false) = (around.marks.as_mut(), held) {
-            let moved = marks.interact(ui, response, transform);
-            around.wishes.moved.cursor |= moved.cursor;
-            around.wishes.moved.range |= moved.range;
-            marked = marks.held();
-        }
-        interact(ui, shown, &mut self.view, !held && !marked);
-        if !self.is_live && self.view.follow {
-            self.view.show_all(self.limits);
-        }
-        if response.has_focus() {
-            self.focus = Some(response.id);
-            let arrows = EventFilter { horizontal_arrows: true, ..EventFilter::default() };
-            ui.memory_mut(|memory| memory.set_focus_lock_filter(response.id, arrows));
-        }
-    }
-
-    /// The menu of a right click.
-    fn menu_ui(&mut self, ui: &mut Ui, panel: &Panel<'_>, around: &mut Around<'_, '_>) {
-        if ui.button(if self.is_live { "Follow the newest sample" } else { "Show everything" }).clicked() {
-            if self.is_live {
-                self.view.follow = true;
-            } else {
-                self.view.show_all(self.limits);
-            }
-        }
-        let text = if self.cursors.is_some() { "Hide the cursors" } else { "Cursors A and B" };
-        if ui.button(text).clicked() {
-            self.cursors = match self.cursors {
-                Some(_) => None,
-                None => Some(Cursors::within(self.view.range())),
-            };
-        }
-        if ui.button("Spectrum of the visible range").clicked() {
-            self.spectra = Some(Spectra::default());
-        }
-        ui.menu_button("Second axis", |ui| second_axis_ui(ui, &mut self.second, panel, around.all));
-        if ui.button(format!("Hide {}", panel.name)).clicked() {
-            self.chosen.insert(panel.name.to_string(), false);
-        }
-        ui.separator();
-        for (kind, text) in [
-            (FigureKind::Csv, "Visible range as CSV…"),
-            (FigureKind::Svg, "Figure as SVG…"),
-            (FigureKind::Png, "Picture as PNG…"),
-        ] {
-            if ui.button(text).clicked() {
-                (self.export.open, self.export.kind, around.dialog) = (true, kind, true);
-            }
-        }
-    }
-
-    /// What a plot shows, in words.
-    fn summary(&self, row: &Row<'_, '_>) -> String {
-        let [from, to] = self.view.range();
-        let mut text = format!("plot of {}, {from:.2} to {to:.2}", label(&row.panel.name, row.unit));
-        for (curve, found) in row.panel.curves.iter().zip(&row.statistics) {
-            let name = row.panel.curve_name(curve);
-            match found {
-                None => text += &format!("; {name}: nothing visible"),
-                Some(found) => {
-                    let shown = |value: f64| to_scale(value, found.peak_to_peak());
-                    text += &format!(
-                        "; {name}: mean {}, from {} to {}, standard deviation {}, {} samples",
-                        shown(found.mean),
-                        shown(found.min),
-                        shown(found.max),
-                        shown(found.std),
-                        found.count
-                    );
-                }
-            }
-        }
-        text
-    }
-
-    /// What a reader of the plot would measure, as text: at a cursor of the page, or of the visible range.
-    fn statistics_ui(&mut self, ui: &mut Ui, row: &Row<'_, '_>, cursor: Option<f64>) {
-        ui.spacing_mut().item_spacing.y = 2.0;
-        ui.add_space(6.0);
-        ui.label(RichText::new(label(&row.panel.name, row.unit)).small().weak());
-        let several = row.panel.curves.len() > 1;
-        for (curve, found) in row.panel.curves.iter().zip(&row.statistics) {
-            let name = if several { curve.name.as_ref() } else { "value" };
-            if let Some(cursor) = cursor {
-                let indexed = indexed(&mut self.caches, row.panel, curve, self.units);
-                let value = indexed.held_at(cursor).map_or(f64::NAN, |index| indexed.y(index));
-                let text = format!("{name:<5}{:>8}", to_scale(value, row.panel.min_span * row.scale));
-                ui.label(mono(text).color(curve.color)).on_hover_text("Value at the time that is shown");
-                continue;
-            }
-            let [mean, std, peak] =
-                found.map_or([f64::NAN; 3], |found| [found.mean, found.std, found.peak_to_peak()]);
-            let scale = if peak.is_nan() { 0.0 } else { peak };
-            if several {
-                let text = format!("{name:<6.6}{:>9}", to_scale(mean, scale));
-                ui.label(mono(text).color(curve.color)).on_hover_text("Mean of the visible samples");
-                continue;
-            }
-            for (name, value, help) in [
-                ("mean", mean, "Mean of the visible samples"),
-                ("std", std, "Standard deviation of the visible samples"),
-                ("p-p", peak, "Peak to peak: largest minus smallest visible sample"),
-            ] {
-                ui.label(mono(format!("{name:<4}{:>10}", to_scale(value, scale)))).on_hover_text(help);
-            }
-        }
-    }
-
-    fn readout_ui(&mut self, ui: &mut Ui, shown: &[&Panel<'_>]) {
-        let Some(mut cursors) = self.cursors else { return };
-        let (units, caches) = (self.units, &mut self.caches);
-        let mut readings = Vec::new();
-        for panel in shown {
-            for curve in &panel.curves {
-                let name = panel.curve_name(curve);
-                let found = indexed(caches, panel, curve, units);
-                readings.push(Reading::new(name, panel.shown_unit(units).0, curve.color, &found, &cursors));
-            }
-        }
-        readout_ui(ui, &mut cursors, &readings, 160.0);
-        self.cursors = Some(cursors);
-    }
-
-    fn spectra_ui(&mut self, ui: &mut Ui, shown: &[&Panel<'_>]) {
-        let Some(mut spectra) = self.spectra.take() else { return };
-        let (range, units) = (self.view.range(), self.units);
-        for panel in shown {
-            for curve in &panel.curves {
-                let key = cache_key(panel, curve);
-                spectra.update(ui, key, curve.generation, range, || {
-                    indexed(&mut self.caches, panel, curve, units)
-                });
-            }
-        }
-        spectra.begin();
-        let heights = heights(ui, shown.len(), 0.0);
-        for (number, panel) in shown.iter().enumerate() {
-            let last = number + 1 == shown.len();
-            let height = if last { heights + X_AXIS_HEIGHT } else { heights };
-            let curves: Vec<_> = panel
-                .curves
-                .iter()
-                .map(|curve| (cache_key(panel, curve), panel.curve_name(curve), curve.color))
-                .collect();
-            let id = format!("{}/spectrum", plot_id(self.name, panel));
-            let unit = panel.shown_unit(units).0;
-            spectra.plot_ui(ui, &id, (&panel.name, unit), (height, last), &curves);
-        }
-        self.spectra = Some(spectra);
-    }
-
-    /// What is to be written of the visible range.
-    fn content(&mut self, shown: &[&Panel<'_>]) -> Content {
-        let (range, units) = (self.view.range(), self.units);
-        match self.export.kind {
-            FigureKind::Png => Content::Picture,
-            FigureKind::Csv => {
-                let caches = &mut self.caches;
-                let curves =
-                    shown.iter().flat_map(|panel| panel.curves.iter().map(move |curve| (panel, curve)));
-                let curves = curves.map(|(panel, curve)| {
-                    let data =
-                        cache(caches, panel, curve).indexed(curve.data, [1.0, curve.gap], curve.generation);
-                    figure::samples(&curve.key, &data, range)
-                });
-                Content::Log { x_key: self.x[1], curves: curves.collect() }
-            }
-            FigureKind::Svg => {
-                let mut drawn = Vec::new();
-                for panel in shown {
-                    let curves = panel.curves.iter().map(|curve| {
-                        let visible =
-                            indexed(&mut self.caches, panel, curve, units).visible(range, figure::COLUMNS);
-                        (panel.curve_name(curve), visible.pieces)
-                    });
-                    let curves = curves.collect();
-                    drawn.push(figure::panel(&panel.name, panel.shown_unit(units), curves, &panel.limits));
-                }
-                Content::Chart(
-                    Box::new(figure::chart(self.name, self.x[0], range, drawn)),
-                    self.export.size(),
-                )
-            }
-        }
-    }
-}
-
-/// Names the second axis of a plot.
-fn second_axis_ui(ui: &mut Ui, second: &mut BTreeMap<String, String>, panel: &Panel<'_>, all: &[Panel<'_>]) {
-    let present = second.get(&*panel.name).cloned();
-    if ui.radio(present.is_none(), "none").clicked() {
-        second.remove(&*panel.name);
-    }
-    for other in all {
-        for curve in &other.curves {
-            let chosen = present.as_deref() == Some(&*curve.key);
-            if ui.radio(chosen, other.curve_name(curve)).clicked() {
-                second.insert(panel.name.to_string(), curve.key.to_string());
-            }
         }
     }
 }
@@ -715,11 +292,4 @@ fn indexed<'c>(
 ) -> Indexed<'c> {
     let look = [panel.shown_unit(units).1, curve.gap];
     cache(caches, panel, curve).indexed(curve.data, look, curve.generation)
-}
-
-/// Height of each plot, without the horizontal axis.
-fn heights(ui: &Ui, count: usize, below: f32) -> f32 {
-    let count = count as f32;
-    let spacing = ui.spacing().item_spacing.y;
-    ((ui.available_height() - X_AXIS_HEIGHT - below - count * spacing) / count).max(LEAST_HEIGHT)
 }

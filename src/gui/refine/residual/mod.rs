@@ -10,6 +10,7 @@ use flqr_core::refine::{Explorer, Refinement, Residual};
 use super::compare;
 use super::run::Answered;
 use super::strip::{StepState, Tone};
+use crate::command::Commands;
 use crate::theme::palette;
 use crate::widgets::{hint_ui, section_ui, shown};
 use in_time::InTime;
@@ -55,12 +56,15 @@ impl ResidualStep {
         &mut self,
         refined: Option<&Answered<Box<Refinement>>>,
         residual: Option<&Answered<Box<Residual>>>,
+        sources: &[String],
+        commands: &Commands,
         ui: &mut Ui,
     ) {
         let room = ui.available_height();
         ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
             if let Some(found) = refined.filter(|found| !found.answer.explorer.before.is_empty()) {
-                self.pictures_ui(&found.answer.explorer, found.generation, room.max(LEAST_HEIGHT), ui);
+                let explorer = (&found.answer.explorer, found.generation);
+                self.pictures_ui(explorer, sources, room.max(LEAST_HEIGHT), commands, ui);
             }
             if let Some(residual) = residual {
                 section_ui(ui, "How far the model is", |_| {});
@@ -72,7 +76,14 @@ impl ResidualStep {
         });
     }
 
-    fn pictures_ui(&mut self, explorer: &Explorer, generation: u64, room: f32, ui: &mut Ui) {
+    fn pictures_ui(
+        &mut self,
+        (explorer, generation): (&Explorer, u64),
+        sources: &[String],
+        room: f32,
+        commands: &Commands,
+        ui: &mut Ui,
+    ) {
         if self.in_time.as_ref().is_none_or(|(number, _)| *number != generation) {
             self.in_time = Some((generation, InTime::new(explorer, generation)));
         }
@@ -86,12 +97,12 @@ impl ResidualStep {
             let colors = palette(ui.visuals());
             // Drawn from the right, so the last comes first.
             for (name, color) in
-                [("after", colors.runs[1]), ("before", colors.runs[0]), ("measured", colors.measured)]
+                [("after", colors.runs[1]), ("before", colors.runs[0]), ("log", colors.measured)]
             {
                 legend_ui(ui, name, color);
             }
         });
-        in_time.ui(explorer, 0.5 * room, ui);
+        in_time.ui(explorer, sources.to_vec(), 0.5 * room, commands, ui);
         section_ui(ui, "Residual over", |ui| {
             ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
                 self.over.controls_ui(explorer, ui);

@@ -1,0 +1,84 @@
+//! What a stack shows, in words and numbers.
+
+use egui::{RichText, Ui};
+
+use super::rows::Row;
+use super::{Panel, Stack, indexed};
+use crate::plot::readout::{Reading, readout_ui};
+use crate::plot::unit::label;
+use crate::quantity::to_scale;
+use crate::widgets::mono;
+
+impl Stack {
+    /// What a plot shows, in words.
+    pub(super) fn summary(&self, row: &Row<'_, '_>) -> String {
+        let [from, to] = self.view.range();
+        let mut text = format!("plot of {}, {from:.2} to {to:.2}", label(&row.panel.name, row.unit));
+        for (curve, found) in row.panel.curves.iter().zip(&row.statistics) {
+            let name = row.panel.curve_name(curve);
+            match found {
+                None => text += &format!("; {name}: nothing visible"),
+                Some(found) => {
+                    let shown = |value: f64| to_scale(value, found.peak_to_peak());
+                    text += &format!(
+                        "; {name}: mean {}, from {} to {}, standard deviation {}, {} samples",
+                        shown(found.mean),
+                        shown(found.min),
+                        shown(found.max),
+                        shown(found.std),
+                        found.count
+                    );
+                }
+            }
+        }
+        text
+    }
+
+    /// What a reader of the plot would measure, as text: at a cursor of the page, or of the visible range.
+    pub(super) fn statistics_ui(&mut self, ui: &mut Ui, row: &Row<'_, '_>, cursor: Option<f64>) {
+        ui.spacing_mut().item_spacing.y = 2.0;
+        ui.add_space(6.0);
+        ui.label(RichText::new(label(&row.panel.name, row.unit)).small().weak());
+        let several = row.panel.curves.len() > 1;
+        for (curve, found) in row.panel.curves.iter().zip(&row.statistics) {
+            let name = if several { curve.name.as_ref() } else { "value" };
+            if let Some(cursor) = cursor {
+                let indexed = indexed(&mut self.caches, row.panel, curve, self.units);
+                let value = indexed.held_at(cursor).map_or(f64::NAN, |index| indexed.y(index));
+                let text = format!("{name:<5}{:>8}", to_scale(value, row.panel.min_span * row.scale));
+                ui.label(mono(text).color(curve.color)).on_hover_text("Value at the time that is shown");
+                continue;
+            }
+            let [mean, std, peak] =
+                found.map_or([f64::NAN; 3], |found| [found.mean, found.std, found.peak_to_peak()]);
+            let scale = if peak.is_nan() { 0.0 } else { peak };
+            if several {
+                let text = format!("{name:<6.6}{:>9}", to_scale(mean, scale));
+                ui.label(mono(text).color(curve.color)).on_hover_text("Mean of the visible samples");
+                continue;
+            }
+            for (name, value, help) in [
+                ("mean", mean, "Mean of the visible samples"),
+                ("std", std, "Standard deviation of the visible samples"),
+                ("p-p", peak, "Peak to peak: largest minus smallest visible sample"),
+            ] {
+                ui.label(mono(format!("{name:<4}{:>10}", to_scale(value, scale)))).on_hover_text(help);
+            }
+        }
+    }
+
+    pub(super) fn readout_ui(&mut self, ui: &mut Ui, shown: &[&Panel<'_>]) {
+        let Some(mut cursors) = self.cursors else { return };
+        let (units, caches) = (self.units, &mut self.caches);
+        let mut readings = Vec::new();
+        for panel in shown {
+            for curve in &panel.curves {
+                let name = panel.curve_name(curve);
+                let found = indexed(caches, panel, curve, units);
+                readings.push(Reading::new(name, panel.shown_unit(units).0, curve.color, &found, &cursors));
+            }
+        }
+        readout_ui(ui, &mut cursors, &readings, 160.0);
+        self.cursors = Some(cursors);
+    }
+}
