@@ -2,8 +2,9 @@
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
+use std::time::Instant;
 
 /// Wakes the window after a worker has put something in a channel.
 pub(crate) type Waker = Arc<dyn Fn() + Send + Sync>;
@@ -11,8 +12,14 @@ pub(crate) type Waker = Arc<dyn Fn() + Send + Sync>;
 /// Progress reports that wait for the window; more are dropped, since only the newest matters.
 const PROGRESS_CAPACITY: usize = 256;
 
+/// Progress wakes the window at most this often, ms: drawing it must not take the processor from the work.
+const WAKE_INTERVAL_MS: u64 = 50;
+
 /// What a job reports through.
 pub(crate) struct Reporter<P> {
+    started: Instant,
+    /// When progress may wake the window next, ms after the start.
+    next_wake_ms: AtomicU64,
     sender: SyncSender<P>,
     cancel: Arc<AtomicBool>,
     waker: Waker,
@@ -29,7 +36,9 @@ impl<P> Reporter<P> {
         if self.is_cancelled() {
             return ControlFlow::Break(());
         }
-        if self.sender.try_send(progress).is_ok() {
+        let now_ms = self.started.elapsed().as_millis() as u64;
+        if self.sender.try_send(progress).is_ok() && now_ms >= self.next_wake_ms.load(Ordering::Relaxed) {
+            self.next_wake_ms.store(now_ms + WAKE_INTERVAL_MS, Ordering::Relaxed);
             (self.waker)();
         }
         ControlFlow::Continue(())
@@ -65,8 +74,13 @@ impl<P: Send + 'static, R: Send + 'static> Job<P, R> {
         let (progress_sender, progress) = sync_channel(PROGRESS_CAPACITY);
         let (result_sender, result) = sync_channel(1);
         let cancel = Arc::new(AtomicBool::new(false));
-        let reporter =
-            Reporter { sender: progress_sender, cancel: Arc::clone(&cancel), waker: Arc::clone(waker) };
+        let reporter = Reporter {
+            started: Instant::now(),
+            next_wake_ms: AtomicU64::new(0),
+            sender: progress_sender,
+            cancel: Arc::clone(&cancel),
+            waker: Arc::clone(waker),
+        };
         std::thread::Builder::new().name(name.to_owned()).spawn(move || {
             let wake = WakeOnDrop(Arc::clone(&reporter.waker));
             // An error means that the window no longer wants the result.

@@ -33,7 +33,8 @@ pub(crate) struct LoadedLog {
 
 /// Horizontal values for the preview.
 pub(crate) struct Axis {
-    pub(crate) values: Vec<f64>,
+    /// Numbers of the rows, where the log has no time that can be an axis.
+    rows: Option<Vec<f64>>,
     pub(crate) label: &'static str,
     /// A larger step is a gap.
     pub(crate) gap: f64,
@@ -165,6 +166,11 @@ impl LoadedLog {
         }
     }
 
+    /// Horizontal values for the preview, as many as rows.
+    pub(crate) fn axis_values(&self) -> &[f64] {
+        self.axis.rows.as_deref().or_else(|| self.log.column("time_s")).unwrap_or_default()
+    }
+
     /// Kind and size, in a line.
     pub(crate) fn summary(&self) -> String {
         let kind = match &self.kind {
@@ -190,11 +196,10 @@ fn axis(log: &Log) -> Axis {
         time.iter().all(|value| value.is_finite()) && time.windows(2).all(|pair| pair[0] <= pair[1])
     };
     match log.column("time_s").filter(usable) {
-        Some(time) => {
-            Axis { values: time.to_vec(), label: "time [s]", gap: 10.0 * row_time_s(time).unwrap_or(1.0) }
-        }
+        Some(time) => Axis { rows: None, label: "time [s]", gap: 10.0 * row_time_s(time).unwrap_or(1.0) },
         None => {
-            Axis { values: (0..log.rows()).map(|row| row as f64).collect(), label: "row", gap: f64::INFINITY }
+            let rows = (0..log.rows()).map(|row| row as f64).collect();
+            Axis { rows: Some(rows), label: "row", gap: f64::INFINITY }
         }
     }
 }

@@ -96,7 +96,7 @@ impl Preview {
     fn plot_ui(&mut self, context: &ViewContext<'_>, loaded: &LoadedLog, ui: &mut Ui) {
         let column = self.column(loaded);
         let Some(column_data) = loaded.log.columns.get(column) else { return };
-        let axis = &loaded.axis.values;
+        let axis = loaded.axis_values();
         let data = [axis.first().copied().unwrap_or(0.0), axis.last().copied().unwrap_or(1.0)];
         if self.fitted_to != loaded.generation {
             self.fitted_to = loaded.generation;
