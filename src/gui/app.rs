@@ -376,6 +376,9 @@ impl App {
         {
             self.say(message);
         }
+        for problem in self.runs.drain() {
+            self.fail(problem);
+        }
         self.experiments.note_runs(&mut self.runs);
         self.friction.note_run(&mut self.runs);
         self.refine.note_run(&mut self.runs);

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use flqr_core::control::ControllerKind;
 use flqr_core::device::{SessionOrder, Source as DeviceSource};
+use flqr_core::effects::Effect;
 use flqr_core::friction::{Compensation, Stribeck};
 use flqr_core::lqr::Weights;
 use flqr_core::robot::RobotParameters;
@@ -123,6 +124,8 @@ pub(crate) enum Command {
     SetFriction([Option<Stribeck>; 2]),
     SetTorqueLimit(Option<f64>),
     SetCompensation(Compensation),
+    /// What the model has beside its declared numbers.
+    SetEffects(Vec<Effect>),
     SetController(ControllerKind),
     SetPaused(bool),
     ResetSimulation,
@@ -149,6 +152,8 @@ pub(crate) enum Command {
     StartTour,
     /// Copies the command that does in a terminal what the page shows.
     CopyLine,
+    /// Copies what makes a run of the ledger again in a terminal.
+    CopyLineOf(u64),
     LoadModel(PathBuf),
     /// Saves; a file other than the loaded one is replaced only after a question.
     SaveModel(PathBuf),

@@ -133,7 +133,13 @@ impl Loader {
     }
 }
 
-fn load(path: &Path, map: &ColumnMap, generation: u64, reporter: &Reporter<LoadProgress>) -> LoadResult {
+/// Reads a log as every page does. May take its time.
+pub(crate) fn load(
+    path: &Path,
+    map: &ColumnMap,
+    generation: u64,
+    reporter: &Reporter<LoadProgress>,
+) -> LoadResult {
     let source = path.display().to_string();
     let unopened = |error: std::io::Error| format!("{source} could not be opened: {error}; check the path");
     let file = File::open(path).map_err(unopened)?;

@@ -2,19 +2,18 @@
 
 use std::sync::LazyLock;
 
-use flqr_core::control::{BalanceController, ControllerKind};
+use flqr_core::control::{BalanceController, ControllerKind, DEFAULT_COMPENSATION};
 use flqr_core::friction::{Compensation, Stribeck};
 use flqr_core::lqr::Weights;
 use flqr_core::model_file::{AxisParameters, Model, Rig, RobotModel, Tolerances, presets};
 use nalgebra::Matrix2x4;
 
-/// Weights and compensation of a robot whose file has none: those of the paper's preset, without the entry
-/// off Q's diagonal, which suits that robot alone.
-static FILLED_IN: LazyLock<(Weights, Compensation)> = LazyLock::new(|| {
-    let paper = presets::paper();
-    let settings = paper.robot().and_then(|robot| robot.weights.zip(robot.compensation));
-    let (weights, compensation) = settings.expect("a test of the core finds both in every preset");
-    (Weights::diagonal(weights.q.diagonal().into(), weights.r.diagonal().into()), compensation)
+/// Weights of a robot whose file has none: those of the paper's preset, without the entry off Q's diagonal, which
+/// suits that robot alone.
+static FILLED_IN: LazyLock<Weights> = LazyLock::new(|| {
+    let weights = presets::paper().robot().and_then(|robot| robot.weights);
+    let weights = weights.expect("a test of the core finds them in every preset");
+    Weights::diagonal(weights.q.diagonal().into(), weights.r.diagonal().into())
 });
 
 /// What the user edits.
@@ -39,15 +38,16 @@ impl Session {
     /// What is used although the model has it not, as a sentence.
     pub(crate) fn filled_in(&self) -> Option<String> {
         let robot = self.robot()?;
-        let tables = match (robot.weights, robot.compensation) {
+        let weights = "the weights of the paper's preset";
+        let Compensation { ratio, smoothing_speed_rad_s } = DEFAULT_COMPENSATION;
+        let usual = format!("{ratio} of the friction, over {smoothing_speed_rad_s} rad/s,");
+        let (tables, used) = match (robot.weights, robot.compensation) {
             (Some(_), Some(_)) => return None,
-            (None, Some(_)) => "[lqr]",
-            (Some(_), None) => "[compensation]",
-            (None, None) => "[lqr] and no [compensation]",
+            (None, Some(_)) => ("[lqr]", format!("{weights} fill in")),
+            (Some(_), None) => ("[compensation]", format!("{usual} fills in")),
+            (None, None) => ("[lqr] and no [compensation]", format!("{weights} and {usual} fill in")),
         };
-        Some(format!(
-            "It has no {tables}: the paper's preset fills in, and nothing of that is saved unedited."
-        ))
+        Some(format!("It has no {tables}: {used}, and nothing of that is saved unedited."))
     }
 
     /// The model as it would be saved.
@@ -91,12 +91,12 @@ impl Session {
 
     /// Weights of the robot.
     pub(crate) fn weights(&self) -> Weights {
-        self.robot().and_then(|robot| robot.weights).unwrap_or(FILLED_IN.0)
+        self.robot().and_then(|robot| robot.weights).unwrap_or(*FILLED_IN)
     }
 
     /// Friction feedforward of the robot.
     pub(crate) fn compensation(&self) -> Compensation {
-        self.robot().and_then(|robot| robot.compensation).unwrap_or(FILLED_IN.1)
+        self.robot().and_then(|robot| robot.compensation).unwrap_or(DEFAULT_COMPENSATION)
     }
 
     /// Friction curve of one motor (0 left, 1 right), or of the axis.

@@ -216,7 +216,7 @@ impl Parameter {
 }
 
 /// Endings of keys and their units, longer ones before those that end alike.
-const UNITS: [(&str, &str); 23] = [
+const UNITS: [(&str, &str); 22] = [
     ("_nm_s2_rad2", "N m s²/rad²"),
     ("_n_s2_m2", "N s²/m²"),
     ("_nm_s_rad", "N m s/rad"),
@@ -238,15 +238,21 @@ const UNITS: [(&str, &str); 23] = [
     ("_n", "N"),
     ("_m", "m"),
     ("_s", "s"),
-    ("order_#", "1/turn"),
     ("", "1"),
 ];
 
 /// Unit that a key's ending names; `1` where it names none.
 pub fn unit_of(key: &str) -> &'static str {
-    let series = key.starts_with("order_").then_some("order_#");
-    let key = series.unwrap_or(key);
-    UNITS.iter().find(|(ending, _)| key.ends_with(ending)).map_or("1", |(_, unit)| unit)
+    name_and_unit(key).1
+}
+
+/// A key without the ending that names its unit, and that unit; `1` where none is named.
+pub fn name_and_unit(key: &str) -> (&str, &'static str) {
+    if key.starts_with("order_") {
+        return ("order", "1/turn");
+    }
+    let ends = |(ending, unit): &(&str, &'static str)| Some((key.strip_suffix(ending)?, *unit));
+    UNITS.iter().find_map(ends).unwrap_or((key, "1"))
 }
 
 /// A kind of effect: all that the library knows of it.

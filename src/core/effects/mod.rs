@@ -24,7 +24,10 @@ mod surroundings;
 pub use acting::RobotLaws;
 pub use effect::{Effect, EffectError, EffectLaw};
 pub use feedforward::EffectFeedforward;
-pub use kind::{Declared, EffectKind, Feedforward, Form, Grid, Parameter, Place, Role, Step, Trial, unit_of};
+pub use kind::{
+    Declared, EffectKind, Feedforward, Form, Grid, Parameter, Place, Role, Step, Trial, name_and_unit,
+    unit_of,
+};
 pub use law::{Action, Law, Moment, Term};
 pub use machine::{Machine, MachineKind};
 

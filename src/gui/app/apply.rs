@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use egui::{Context, Theme};
 use flqr_core::device::{SessionOptions, Source as DeviceSource};
-use flqr_core::model_file::{Model, presets};
+use flqr_core::model_file::{Model, Rig, presets};
 
 use super::keep::{self, absolute};
 use super::questions::{Question, Replacement};
@@ -90,13 +90,8 @@ impl App {
                 self.tour = Some(Tour::default());
                 self.commands.send(Command::SelectTab(Tab::Tune));
             }
-            Command::CopyLine => match self.command_line() {
-                Ok(line) => {
-                    self.say(format!("Copied: {line}"));
-                    ctx.copy_text(line);
-                }
-                Err(problem) => self.fail(problem),
-            },
+            Command::CopyLine => self.copy_line(self.command_line(), ctx),
+            Command::CopyLineOf(run) => self.copy_line(self.runs.command_of(run), ctx),
             Command::AskFile(purpose) => self.ask_file(purpose),
             Command::OpenSession(path) => self.open_session(absolute(path)),
             Command::SaveSession { path, replace } => self.save_session(absolute(path), replace, ctx),
@@ -136,6 +131,15 @@ impl App {
                     robot.compensation = Some(compensation);
                 }
                 self.send_controller();
+            }
+            Command::SetEffects(effects) => {
+                self.undo.call("effects");
+                match &mut self.session.rig {
+                    Rig::Robot(robot) => robot.effects = effects,
+                    Rig::Axis(axis) => axis.effects = effects,
+                }
+                self.designer.update(&self.session);
+                self.send_robot();
             }
             Command::SetController(kind) => {
                 self.session.controller = kind;
@@ -177,7 +181,7 @@ impl App {
             Command::ChooseRecording(path) => self.robot.note_recording_path(&path),
             Command::ChooseFigure(file, answer) => file.answer(ctx, answer),
             Command::Runs(command) => {
-                if let Some(text) = self.runs.apply(command) {
+                if let Some(text) = self.runs.apply(command, &self.waker) {
                     self.say(text);
                 }
             }
@@ -303,11 +307,22 @@ impl App {
         self.say("The weights are those of the loaded model again.");
     }
 
+    fn copy_line(&mut self, line: Result<String, String>, ctx: &Context) {
+        match line {
+            Ok(line) => {
+                self.say(format!("Copied: {line}"));
+                ctx.copy_text(line);
+            }
+            Err(problem) => self.fail(problem),
+        }
+    }
+
     /// The command that does in a terminal what the page shows.
     fn command_line(&self) -> Result<String, String> {
         let model = self.model_path_of_session();
         match self.tab {
-            Tab::Tune | Tab::Runs | Tab::Log => Ok(command_line::gains(model)),
+            Tab::Tune | Tab::Log => Ok(command_line::gains(model)),
+            Tab::Runs => self.runs.command_line(),
             Tab::Friction => self.friction.command_line(model),
             Tab::Refine => self.refine.command_line(&self.session, model),
             Tab::Experiments => Ok(self.experiments.command_line(model)),
@@ -500,7 +515,8 @@ impl App {
     }
 
     fn start_fit(&mut self) {
-        if let Err(problem) = self.friction.start_fit(self.session.model(), &self.waker) {
+        let path = self.model_path_of_session().map(Path::to_owned);
+        if let Err(problem) = self.friction.start_fit(self.session.model(), path.as_deref(), &self.waker) {
             self.fail(problem);
         }
     }

@@ -9,6 +9,7 @@ use super::{App, Saved};
 use crate::command::Command;
 use crate::document::{self, Base, Content, Document, Left, Opened};
 use crate::job::{Job, Outcome, Reporter, Waker};
+use crate::refine::RefineCommand;
 use crate::session::Session;
 use crate::write_file::write_file;
 
@@ -124,6 +125,7 @@ impl App {
             experiment: Some(self.experiments.to_value()),
             column_map: (!column_map.is_empty()).then_some(column_map),
             log: self.friction.log_path().map(Path::to_owned),
+            refine_logs: Some(self.refine.log_files()).filter(|logs| !logs.is_empty()),
             source: Some(self.source),
             connection: Some(self.robot.form.to_value()),
             layout: Some(self.layout.node()),
@@ -213,6 +215,9 @@ impl App {
         if let Some(runs) = &document.runs {
             self.ledgers.push(runs.clone());
             self.show_ledger(self.ledgers.len() - 1);
+        }
+        for (path, held_out) in document.refine_logs.iter().flatten().cloned() {
+            self.commands.send(Command::Refine(RefineCommand::Load { path, held_out }));
         }
         for problem in self.take_surroundings(document, ctx) {
             self.fail(format!("{name}: {problem}."));

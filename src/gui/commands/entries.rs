@@ -51,6 +51,8 @@ fn entry(
         menu,
         name: name.into(),
         help: help.into(),
+        also: "",
+        group: None,
         keys: keys.to_vec(),
         send: Box::new(send),
     }
@@ -97,7 +99,8 @@ fn file() -> Vec<Entry> {
             "A measurement, from a CSV file",
             &[],
             dialog(FilePurpose::OpenLog),
-        ),
+        )
+        .also("csv import measurement load"),
         entry(
             menu,
             "open-recording",
@@ -134,7 +137,8 @@ fn file() -> Vec<Entry> {
             "Model, layout, sources and forms as they were saved",
             &[],
             dialog(FilePurpose::OpenSession),
-        ),
+        )
+        .also("project workspace layout load"),
         entry(
             menu,
             "save-session",
@@ -142,7 +146,8 @@ fn file() -> Vec<Entry> {
             "Model, layout, sources and forms, in one file",
             &[],
             dialog(FilePurpose::SaveSession),
-        ),
+        )
+        .also("project workspace layout"),
         entry(
             menu,
             "quit",
@@ -150,7 +155,8 @@ fn file() -> Vec<Entry> {
             "Close the window; asks if the model is not saved",
             &[ctrl(Key::Q)],
             |_| Ok(Command::Quit),
-        ),
+        )
+        .also("exit close"),
     ]
 }
 
@@ -194,7 +200,8 @@ fn edit() -> Vec<Entry> {
             &[],
             |s| if s.tab == Tab::Log { Err("this page does nothing") } else { Ok(Command::CopyLine) },
         ),
-        entry(menu, "steps", "Steps…", "All that can be undone, by name", &[], |_| Ok(Command::ShowSteps)),
+        entry(menu, "steps", "Steps…", "All that can be undone, by name", &[], |_| Ok(Command::ShowSteps))
+            .also("history"),
         entry(
             menu,
             "weights",
@@ -271,10 +278,19 @@ fn view() -> Vec<Entry> {
                 menu,
                 format!("{}-{}", side.key(), tab.key()),
                 format!("{} {}", tab.title(), side.words()),
-                "In a tile of its own",
+                match side {
+                    Side::Back => "To the tile of the other pages",
+                    Side::Right | Side::Below => "In a tile of its own",
+                },
                 &[],
                 move |_| Ok(Command::MoveTab(tab, side)),
             )
+            .group("Tiles")
+            .also(match side {
+                Side::Back => "tile layout dock close join",
+                Side::Right => "tile layout dock split beside column",
+                Side::Below => "tile layout dock split below row",
+            })
         })
     };
     let zoom = |factor: f32| move |s: &Situation<'_>| Ok(Command::SetZoom(s.zoom * factor));
@@ -283,10 +299,12 @@ fn view() -> Vec<Entry> {
     all.extend([
         entry(menu, "reset-layout", "Reset the layout", "All pages in one tile again", &[], |s| {
             if s.is_usual_layout { Err("it is as at the first start") } else { Ok(Command::ResetLayout) }
-        }),
+        })
+        .also("tiles split dock default"),
         entry(menu, "theme", "Light or dark", "Switch between light and dark", &[ctrl(Key::D)], |s| {
             Ok(Command::SetDark(!s.is_dark))
-        }),
+        })
+        .also("theme mode colours"),
         entry(
             menu,
             "larger",

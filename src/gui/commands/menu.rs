@@ -2,7 +2,7 @@
 
 use egui::{Button, Grid, RichText, ScrollArea, Ui};
 
-use super::{ALL, GESTURES, Menu, Situation};
+use super::{ALL, Entry, GESTURES, Menu, Situation};
 use crate::command::Commands;
 
 /// The menu button with all menus.
@@ -20,20 +20,39 @@ pub(crate) fn menu_ui(situation: &Situation<'_>, commands: &Commands, ui: &mut U
 }
 
 fn entries_ui(menu: Menu, situation: &Situation<'_>, commands: &Commands, ui: &mut Ui) {
-    for entry in ALL.iter().filter(|entry| entry.menu == menu) {
-        let sent = entry.send(situation);
-        let button = Button::new(&*entry.name).shortcut_text(entry.keys_text(ui.ctx()));
-        let button = ui.add_enabled(sent.is_ok(), button).accessible_name(entry.accessible_name(&sent));
-        let button = button.on_hover_text(&*entry.help);
-        match sent {
-            Ok(command) if button.clicked() => {
-                commands.send(command);
-                ui.close();
+    let of_menu = || ALL.iter().filter(move |entry| entry.menu == menu);
+    let mut shown: Vec<&str> = Vec::new();
+    for entry in of_menu() {
+        match entry.group {
+            None => entry_ui(entry, situation, commands, ui),
+            Some(group) if shown.contains(&group) => {}
+            Some(group) => {
+                shown.push(group);
+                ui.menu_button(group, |ui| {
+                    ScrollArea::vertical().max_height(560.0).show(ui, |ui| {
+                        for entry in of_menu().filter(|entry| entry.group == Some(group)) {
+                            entry_ui(entry, situation, commands, ui);
+                        }
+                    });
+                });
             }
-            Ok(_) => {}
-            Err(reason) => {
-                button.on_disabled_hover_text(reason);
-            }
+        }
+    }
+}
+
+fn entry_ui(entry: &Entry, situation: &Situation<'_>, commands: &Commands, ui: &mut Ui) {
+    let sent = entry.send(situation);
+    let button = Button::new(&*entry.name).shortcut_text(entry.keys_text(ui.ctx()));
+    let button = ui.add_enabled(sent.is_ok(), button).accessible_name(entry.accessible_name(&sent));
+    let button = button.on_hover_text(&*entry.help);
+    match sent {
+        Ok(command) if button.clicked() => {
+            commands.send(command);
+            ui.close();
+        }
+        Ok(_) => {}
+        Err(reason) => {
+            button.on_disabled_hover_text(reason);
         }
     }
 }

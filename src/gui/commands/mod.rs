@@ -79,11 +79,25 @@ pub(crate) struct Entry {
     pub(crate) menu: Menu,
     pub(crate) name: Cow<'static, str>,
     pub(crate) help: Cow<'static, str>,
+    /// Other words under which the palette finds it.
+    also: &'static str,
+    /// The menu inside of its menu that it is in.
+    group: Option<&'static str>,
     pub(crate) keys: Vec<KeyboardShortcut>,
     send: Box<dyn Fn(&Situation<'_>) -> Sent + Send + Sync>,
 }
 
 impl Entry {
+    /// The same, found by other words too.
+    fn also(self, words: &'static str) -> Self {
+        Self { also: words, ..self }
+    }
+
+    /// The same in a menu of its own.
+    fn group(self, title: &'static str) -> Self {
+        Self { group: Some(title), ..self }
+    }
+
     /// What the command sends as things stand, or why it cannot be given.
     pub(crate) fn send(&self, situation: &Situation<'_>) -> Sent {
         (self.send)(situation)

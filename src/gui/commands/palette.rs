@@ -2,7 +2,7 @@
 
 use egui::{Button, Context, Key, Modal, Modifiers, RichText, ScrollArea, TextEdit, Ui, vec2};
 
-use super::{ALL, Situation};
+use super::{ALL, Entry, Situation};
 use crate::command::{Command, Commands};
 use crate::robot::{STOP_HEIGHT, stop_ui};
 use crate::widgets::hint_ui;
@@ -104,10 +104,18 @@ pub(super) fn found(filter: &str) -> Vec<usize> {
     let mut found: Vec<_> = ALL
         .iter()
         .enumerate()
-        .filter_map(|(index, entry)| Some((distance(&filter, &entry.name.to_lowercase())?, index)))
+        .filter_map(|(index, entry)| Some((distance_to(&filter, entry)?, index)))
         .collect();
     found.sort_unstable();
     found.into_iter().map(|(_, index)| index).collect()
+}
+
+/// How far a command is from `filter`: by its name, or as a part of a name by its other words.
+fn distance_to(filter: &str, entry: &Entry) -> Option<(usize, usize)> {
+    let known = |word: &str| entry.also.split(' ').any(|other| other.starts_with(word));
+    let by_words = filter.split_whitespace().all(known) && !filter.is_empty();
+    let by_name = distance(filter, &entry.name.to_lowercase());
+    by_name.into_iter().chain(by_words.then_some((3, 1))).min()
 }
 
 /// How far `name` is from `filter`; none where it has not all of its letters in their order. The whole name is
@@ -150,8 +158,18 @@ mod tests {
             ("rst weights", "reset-weights"),
             ("source: can", "source-can"),
             ("friction", "tab-friction"),
+            ("split", "right-tune"),
+            ("tiles", "reset-layout"),
+            ("csv", "open-log"),
+            ("exit", "quit"),
         ] {
             assert_eq!(first(filter), id, "{filter}");
+        }
+        for filter in ["tile", "split", "dock"] {
+            let layout = |index: &usize| {
+                matches!(ALL[*index].group, Some("Tiles")) || ALL[*index].id == "reset-layout"
+            };
+            assert!(found(filter).iter().take(10).all(layout), "{filter}");
         }
         assert!(found("zzzzq").is_empty());
         assert_eq!(found("").len(), ALL.len());

@@ -40,6 +40,8 @@ pub(crate) struct Document {
     pub(crate) experiment: Option<Value>,
     pub(crate) column_map: Option<String>,
     pub(crate) log: Option<PathBuf>,
+    /// Logs of the *Refine* page, and whether each is held out.
+    pub(crate) refine_logs: Option<Vec<(PathBuf, bool)>>,
     pub(crate) source: Option<Source>,
     pub(crate) connection: Option<Value>,
     pub(crate) layout: Option<Node>,
@@ -78,6 +80,10 @@ impl Document {
             "experiment": self.experiment,
             "column_map": self.column_map,
             "log": path(&self.log),
+            "refine_logs": self.refine_logs.as_ref().map(|logs| {
+                let log = |(path, held_out): &(PathBuf, bool)| json!({ "path": path.to_str(), "held_out": held_out });
+                logs.iter().map(log).collect::<Vec<_>>()
+            }),
             "source": self.source.map(Source::key),
             "connection": self.connection,
             "layout": self.layout.as_ref().map(Node::to_value),
@@ -147,6 +153,14 @@ impl Document {
             "experiment" => self.experiment = Some(value.clone()),
             "column_map" => self.column_map = Some(text()?.to_owned()),
             "log" => self.log = Some(path()?),
+            "refine_logs" => {
+                let log = |log: &Value| {
+                    let path = PathBuf::from(log.get("path")?.as_str()?);
+                    Some((path, log.get("held_out")?.as_bool()?))
+                };
+                let logs = value.as_array().ok_or_else(unread)?;
+                self.refine_logs = Some(logs.iter().map(log).collect::<Option<_>>().ok_or_else(unread)?);
+            }
             "source" => {
                 let all = Source::ALL.into_iter().map(|(source, ..)| source);
                 let named = text().map(|name| all.into_iter().find(|source| source.key() == name))?;
@@ -193,6 +207,7 @@ mod tests {
             experiment: Some(json!({ "scenario": "slope", "seconds": 12.5, "seed": 3 })),
             column_map: Some("a=b*2".to_owned()),
             log: Some("/a/log.csv".into()),
+            refine_logs: Some(vec![("/a/run.csv".into(), false), ("/a/held.csv".into(), true)]),
             source: Some(Source::Can),
             connection: Some(json!({ "interface": "can1" })),
             layout: Some(Node::default().moved(Tab::Robot, Side::Right)),

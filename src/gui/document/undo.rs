@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use flqr_core::effects::name_and_unit;
 use flqr_core::model_file::Change;
 
 use crate::design::Comparison;
@@ -203,7 +204,24 @@ pub(crate) fn words(key: &str) -> String {
         ("lqr.r_diagonal[2]", "right torque weight"),
     ];
     let known = WEIGHTS.iter().find(|(known, _)| *known == key);
-    known.map_or_else(|| key.to_owned(), |(_, words)| (*words).to_owned())
+    known.map_or_else(|| plain_words(key), |(_, words)| (*words).to_owned())
+}
+
+/// A key without a name of its own: its table, its words, and its unit in brackets.
+fn plain_words(key: &str) -> String {
+    let (table, name) = key.rsplit_once('.').unwrap_or(("", key));
+    let (name, unit) = name_and_unit(name);
+    let mut words = match table {
+        "" | "robot" | "axis" => String::new(),
+        "friction" => "friction ".to_owned(),
+        _ if table.starts_with("friction.") => format!("{} friction ", &table["friction.".len()..]),
+        _ => format!("{} ", table.replace(['_', '.'], " ")),
+    };
+    words += &name.replace('_', " ");
+    if unit != "1" {
+        words += &format!(" [{unit}]");
+    }
+    words
 }
 
 #[cfg(test)]
@@ -260,6 +278,28 @@ mod tests {
         let (_, forth) = undo.go(true).unwrap();
         assert_eq!(forth, end);
         assert!(undo.go(true).is_none());
+    }
+
+    #[test]
+    fn keys_of_a_model_file_are_told_in_words_with_their_units() {
+        for (key, words_of_it) in [
+            ("lqr.q_diagonal[3]", "pitch weight"),
+            ("robot.body_mass_kg", "body mass [kg]"),
+            ("robot.wheel_inertia_kg_m2", "wheel inertia [kg m²]"),
+            ("robot.gravity_m_s2", "gravity [m/s²]"),
+            ("friction.left.viscous_nm_s_rad", "left friction viscous [N m s/rad]"),
+            ("limits.torque_nm", "limits torque [N m]"),
+            ("compensation.ratio", "compensation ratio"),
+            ("name", "name"),
+        ] {
+            assert_eq!(words(key), words_of_it);
+        }
+        // No two values of a model are told alike.
+        let mut all: Vec<String> = presets::paper().entries().keys().map(|key| words(key)).collect();
+        let count = all.len();
+        all.sort();
+        all.dedup();
+        assert_eq!(all.len(), count);
     }
 
     #[test]

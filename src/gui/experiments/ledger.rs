@@ -32,7 +32,13 @@ impl Comparison {
             row = row.with("setting.kp", Value::Number(gains.kp)).with("setting.ki", Value::Number(gains.ki));
         }
         let series = Series { time_s: run.time_s.clone(), channels: self.channels(run) };
-        Run { seed: Some(settings.seed), result: self.result(run), series: Some(Arc::new(series)), ..row }
+        Run {
+            seed: Some(settings.seed),
+            command: Some(self.command_line(variant)),
+            result: self.result(run),
+            series: Some(Arc::new(series)),
+            ..row
+        }
     }
 
     fn channels(&self, run: &Recorded) -> Vec<Channel> {

@@ -81,11 +81,12 @@ struct MadeWith {
     model: Option<Model>,
     motor: Motor,
     options: FitOptions,
+    command: Option<String>,
 }
 
 impl MadeWith {
     fn row(&self, report: &FitReport, sources: Sources) -> Run {
-        let Self { log, model, motor, options } = self;
+        let Self { log, model, motor, options, command } = self;
         let name = Path::new(&log.source)
             .file_name()
             .map_or(log.source.as_str().into(), |name| name.to_string_lossy());
@@ -101,7 +102,7 @@ impl MadeWith {
             row = row.with(&format!("result.{key}"), Value::Number(estimate.value));
             result += &format!(", {key} {}", shown(estimate.value, 3));
         }
-        Run { seed: Some(options.seed), result, ..row }
+        Run { seed: Some(options.seed), command: command.clone(), result, ..row }
     }
 }
 
@@ -117,15 +118,27 @@ impl FitRun {
         self.job.is_some()
     }
 
-    pub(super) fn start(&mut self, loaded: &LoadedLog, model: Model, waker: &Waker) -> Result<(), String> {
+    /// `command` makes the same fit in a terminal.
+    pub(super) fn start(
+        &mut self,
+        loaded: &LoadedLog,
+        model: Model,
+        command: Option<String>,
+        waker: &Waker,
+    ) -> Result<(), String> {
         self.discard();
         let log = Arc::clone(&loaded.log);
         let model = fitting_model(loaded.kind.as_ref().ok().copied(), model).filter(|_| self.from_model);
         self.held = model.is_some();
         let motor = self.motor;
         let options = self.options();
-        let made_with =
-            MadeWith { log: Arc::clone(&log), model: model.clone(), motor, options: options.clone() };
+        let made_with = MadeWith {
+            log: Arc::clone(&log),
+            model: model.clone(),
+            motor,
+            options: options.clone(),
+            command,
+        };
         let work = move |reporter: &crate::job::Reporter<Step>| {
             let mut watch = |progress: &FitProgress| {
                 reporter.progress(Step {

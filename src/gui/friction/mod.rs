@@ -75,11 +75,18 @@ impl FrictionTab {
         self.loader.cancel();
     }
 
-    pub(crate) fn start_fit(&mut self, model: Model, waker: &Waker) -> Result<(), String> {
+    /// `path` is the file that holds `model`.
+    pub(crate) fn start_fit(
+        &mut self,
+        model: Model,
+        path: Option<&Path>,
+        waker: &Waker,
+    ) -> Result<(), String> {
+        let command = self.command_line(path).ok();
         let Some(loaded) = self.loader.log() else {
             return Err("There is no log to fit: load one first.".to_owned());
         };
-        self.fit.start(loaded, model, waker)
+        self.fit.start(loaded, model, command, waker)
     }
 
     pub(crate) fn cancel_fit(&self) {

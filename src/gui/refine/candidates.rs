@@ -14,11 +14,23 @@ const BAR: f32 = 90.0;
 /// How this step stands.
 pub(super) fn state(found: Option<&Refinement>) -> StepState {
     let Some(found) = found else { return StepState::new("nothing tried", Tone::Open) };
-    let added = found.candidates.iter().filter(|tried| tried.fate == Fate::Added).count();
-    match found.candidates.len() {
+    let listed = listed(found);
+    let added = listed.iter().filter(|tried| tried.fate == Fate::Added).count();
+    match listed.len() {
         0 => StepState::new("nothing listed", Tone::Open),
         count => StepState::new(format!("{count} tried, {added} added"), Tone::Plain),
     }
+}
+
+/// What was tried, each once: of trials that read alike, the best.
+fn listed(found: &Refinement) -> Vec<&Tried> {
+    let mut listed: Vec<&Tried> = Vec::new();
+    for tried in &found.candidates {
+        if !listed.iter().any(|other| (other.kind.id, &other.detail) == (tried.kind.id, &tried.detail)) {
+            listed.push(tried);
+        }
+    }
+    listed
 }
 
 pub(super) fn ui(found: &Refinement, ui: &mut Ui) {
@@ -46,7 +58,7 @@ pub(super) fn ui(found: &Refinement, ui: &mut Ui) {
             hint_ui(ui, title);
         }
         ui.end_row();
-        for (index, tried) in found.candidates.iter().enumerate() {
+        for (index, tried) in listed(found).into_iter().enumerate() {
             row_ui(index, tried, ui);
         }
     });

@@ -1,6 +1,6 @@
 //! A refinement as a row of the ledger.
 
-use super::RefineTab;
+use super::{Question, RefineTab};
 use crate::runs::{Run, RunKind, RunsTab, Value};
 use crate::widgets::shown;
 
@@ -30,6 +30,7 @@ impl RefineTab {
             result += &format!(", {id} −{} %", shown(drop, 2));
             row = row.with(&format!("result.{id}.error_drop_percent"), Value::Number(drop));
         }
-        Some(Run { seed: Some(made.settings.seed), result, ..row })
+        let command = made.command_line(Question::Refine, refined.model_path.as_deref());
+        Some(Run { seed: Some(made.settings.seed), command: Some(command), result, ..row })
     }
 }

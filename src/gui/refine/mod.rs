@@ -113,6 +113,12 @@ impl RefineTab {
         !self.sources.list.is_empty()
     }
 
+    /// The logs that are files, and whether each is held out.
+    pub(crate) fn log_files(&self) -> Vec<(PathBuf, bool)> {
+        let files = self.sources.list.iter().filter(|source| !source.is_made());
+        files.map(|source| (source.path.clone(), source.held_out)).collect()
+    }
+
     pub(crate) fn is_running(&self) -> bool {
         self.run.running().is_some()
     }

@@ -28,6 +28,13 @@ pub(super) struct Source {
     pub(super) loader: Loader,
 }
 
+impl Source {
+    /// Whether no file has it.
+    pub(super) fn is_made(&self) -> bool {
+        self.made
+    }
+}
+
 /// A log as a question takes it.
 #[derive(Clone)]
 pub(super) struct Input {

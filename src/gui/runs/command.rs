@@ -5,6 +5,8 @@
 pub(crate) enum RunsCommand {
     /// Takes the rows out; they can be put back.
     Delete(Vec<u64>),
+    /// Reads the curves of a recording from its file.
+    ReadCurves(u64),
     /// Puts back what was taken out last.
     UndoDelete,
     /// The user's own words on a row.

@@ -3,6 +3,7 @@
 
 mod changes;
 mod command;
+mod curves;
 mod overlay;
 mod run;
 mod table;
@@ -16,10 +17,12 @@ use flqr_core::device::RecordingStatus;
 use flqr_core::model_file::Model;
 
 use crate::context::ViewContext;
+use crate::job::Waker;
 use crate::panes::{Pane, panes_ui};
 use crate::widgets::empty_page_ui;
 use changes::Changes;
 pub(crate) use command::RunsCommand;
+use curves::Reading;
 use overlay::Overlay;
 pub(crate) use run::{Channel, Ledger, Run, RunKind, Series, Sources, Value};
 use table::RunTable;
@@ -37,6 +40,7 @@ pub(crate) struct RunsTab {
     overlay: Overlay,
     changes: Changes,
     recording: RecordingWatch,
+    reading: Vec<Reading>,
 }
 
 impl RunsTab {
@@ -53,9 +57,48 @@ impl RunsTab {
         }
     }
 
+    /// Takes in curves that have been read; a sentence for each recording that could not be.
+    pub(crate) fn drain(&mut self) -> Vec<String> {
+        let mut problems = Vec::new();
+        for mut reading in std::mem::take(&mut self.reading) {
+            match reading.drain() {
+                None => self.reading.push(reading),
+                Some(Ok(series)) => self.ledger.set_series(reading.number, series),
+                Some(Err(problem)) => {
+                    self.ticked.remove(&reading.number);
+                    problems.push(format!("Run {} cannot be drawn: {problem}.", reading.number));
+                }
+            }
+        }
+        problems
+    }
+
+    fn read_curves(&mut self, number: u64, waker: &Waker) -> Option<String> {
+        let file = self.ledger.row(number)?.file()?;
+        if self.reading.iter().any(|reading| reading.number == number) {
+            return None;
+        }
+        match Reading::start(number, file, waker) {
+            Ok(reading) => {
+                self.reading.push(reading);
+                None
+            }
+            Err(problem) => Some(problem),
+        }
+    }
+
+    /// The command that makes a row again.
+    ///
+    /// # Errors
+    /// A sentence says why nothing does.
+    pub(crate) fn command_of(&self, number: u64) -> Result<String, String> {
+        self.ledger.row(number).ok_or("There is no such run.")?.command_line()
+    }
+
     /// Changes the ledger; a sentence where there is something to say.
-    pub(crate) fn apply(&mut self, command: RunsCommand) -> Option<String> {
+    pub(crate) fn apply(&mut self, command: RunsCommand, waker: &Waker) -> Option<String> {
         match command {
+            RunsCommand::ReadCurves(number) => self.read_curves(number, waker),
             RunsCommand::Delete(numbers) => {
                 let rows: Vec<Run> =
                     numbers.iter().filter_map(|number| self.ledger.remove(*number)).collect();
@@ -97,6 +140,19 @@ impl RunsTab {
         before
     }
 
+    /// The command that makes the ticked row again, or the newest where none is ticked.
+    ///
+    /// # Errors
+    /// A sentence says why there is none.
+    pub(crate) fn command_line(&self) -> Result<String, String> {
+        let run = match self.ticked.len() {
+            0 => self.ledger.rows().last().map(|run| &**run),
+            1 => self.ticked.first().and_then(|number| self.ledger.row(*number)),
+            _ => return Err("Several rows are ticked: tick the one whose command is wanted.".to_owned()),
+        };
+        run.ok_or("There is no run yet.")?.command_line()
+    }
+
     /// What the page shows, as `--state-out` writes it.
     pub(crate) fn snapshot(&self) -> serde_json::Value {
         let rows: Vec<_> = self
@@ -113,6 +169,8 @@ impl RunsTab {
                     "weights": run.weights(),
                     "result": run.result,
                     "note": run.note,
+                    "command": run.command,
+                    "values": run.series.as_ref().map_or(0, |series| series.size()),
                 })
             })
             .collect();

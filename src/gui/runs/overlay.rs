@@ -13,8 +13,8 @@ use crate::plot::{Data, Panel, PanelCurve, Stack, Unit};
 use crate::theme::palette;
 use crate::widgets::{choice_ui, hint_ui, mono, number_ui, section_ui, shown, warning_ui};
 
-/// Why a row cannot be drawn.
-pub(super) const NO_SERIES: &str = "This row has no curves in memory: it is compared by its values alone";
+/// Why nothing of the ticked rows is drawn.
+const NO_SERIES: &str = "The ticked rows have no curves in memory.";
 /// A step in time this many times longer than the usual one is drawn as a gap.
 const GAP: f64 = 10.0;
 /// The plot is at least this high, with its axis.

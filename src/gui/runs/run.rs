@@ -1,6 +1,7 @@
 //! One row of the ledger, and all of them.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 use std::sync::Arc;
 
 use flqr_core::model_file::{Entry, Model};
@@ -56,7 +57,8 @@ pub(crate) struct Series {
 }
 
 impl Series {
-    fn size(&self) -> usize {
+    /// How many values there are, times included.
+    pub(super) fn size(&self) -> usize {
         self.time_s.len() * (1 + self.channels.len())
     }
 }
@@ -143,6 +145,25 @@ impl Run {
         };
         let (q, r) = (diagonal("q", 4), diagonal("r", 2));
         if q.is_empty() { String::new() } else { format!("{} | {}", q.join(" "), r.join(" ")) }
+    }
+
+    /// What makes it again in a terminal.
+    ///
+    /// # Errors
+    /// A sentence says why nothing does.
+    pub(super) fn command_line(&self) -> Result<String, String> {
+        self.command.clone().ok_or_else(|| match self.kind {
+            RunKind::Recording => format!("Run {} was recorded: no command makes it again.", self.number),
+            _ => format!("Run {} comes from a file that does not keep its command.", self.number),
+        })
+    }
+
+    /// The file that its curves can be read from.
+    pub(super) fn file(&self) -> Option<&Path> {
+        match self.made_with.get(super::watch::FILE) {
+            Some(Value::Text(file)) if self.kind == RunKind::Recording => Some(Path::new(file)),
+            _ => None,
+        }
     }
 
     /// What exports say of it, in one line.
@@ -240,6 +261,14 @@ impl Ledger {
     /// How many rows there are that `other` has not.
     pub(crate) fn missing_in(&self, other: &Self) -> usize {
         self.rows.iter().filter(|row| !other.has(row)).count()
+    }
+
+    /// Curves of a row that has been read again.
+    pub(super) fn set_series(&mut self, number: u64, series: Series) {
+        if let Some(run) = self.row_mut(number) {
+            run.series = Some(Arc::new(series));
+            self.forget_old_series();
+        }
     }
 
     /// Rows that are in `before` too keep their curves.

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use egui::{Button, Grid, Label, RichText, ScrollArea, TextEdit, Ui};
+use egui::{Button, Checkbox, Grid, Label, RichText, ScrollArea, Sense, TextEdit, Ui};
 
-use super::run::{Ledger, Run};
+use super::run::{Ledger, Run, RunKind};
 use super::{RunsCommand, overlay};
 use crate::command::Command;
 use crate::context::ViewContext;
@@ -112,22 +112,7 @@ impl RunTable {
         ui: &mut Ui,
     ) {
         let number = run.number;
-        let mut tick = ticked.contains(&number);
-        ui.horizontal(|ui| {
-            let drawn = run.series.is_some();
-            let help = if drawn { "Draw it below, over the other ticked rows" } else { overlay::NO_SERIES };
-            let check = ui.checkbox(&mut tick, "").accessible_name(format!("show run {number}"));
-            if check.on_hover_text(help).changed() {
-                if tick {
-                    ticked.insert(number)
-                } else {
-                    ticked.remove(&number)
-                };
-            }
-            if tick && drawn {
-                overlay::key_ui(ui, ticked, number);
-            }
-        });
+        ui.horizontal(|ui| tick_ui(context, run, ticked, ui));
         ui.horizontal(|ui| {
             ui.label(mono(number.to_string()).strong());
             let delete =
@@ -138,7 +123,7 @@ impl RunTable {
         });
         ui.label(mono(clock(run.unix_s))).on_hover_text(format!("{} seconds since 1970", run.unix_s));
         ui.label(run.kind.name());
-        ui.label(&run.title);
+        title_ui(context, run, ui);
         ui.label(mono(run.seed.map_or("–".to_owned(), |seed| seed.to_string())));
         ui.label(mono(run.weights()).small());
         ui.label(mono(run.sources.get(..8).unwrap_or(&run.sources)).small().weak())
@@ -167,6 +152,56 @@ impl RunTable {
             context.commands.send(Command::Runs(RunsCommand::SetNote(number, text)));
         }
     }
+}
+
+/// Whether a row is drawn: offered only where that shows something.
+fn tick_ui(context: &ViewContext<'_>, run: &Run, ticked: &mut BTreeSet<u64>, ui: &mut Ui) {
+    let number = run.number;
+    let mut tick = ticked.contains(&number);
+    let drawn = run.series.is_some();
+    let help = match (drawn, run.file().is_some(), run.kind) {
+        (true, ..) => "Draw it below, over the other ticked rows",
+        (_, true, _) => "Read its curves from its file and draw them below, over the other ticked rows",
+        (_, _, RunKind::Fit | RunKind::Refinement) => {
+            "It has no curves over time: its values are compared under “What changed”"
+        }
+        (_, _, RunKind::Experiment | RunKind::Recording) => {
+            "Its curves are not in memory any more: its values are compared under “What changed”; its command makes it again"
+        }
+    };
+    let check = ui.add_enabled(tick || drawn || run.file().is_some(), Checkbox::new(&mut tick, ""));
+    let check = check.accessible_name(format!("show run {number}"));
+    if check.on_hover_text(help).on_disabled_hover_text(help).changed() {
+        if !tick {
+            ticked.remove(&number);
+        } else {
+            ticked.insert(number);
+            if !drawn {
+                context.commands.send(Command::Runs(RunsCommand::ReadCurves(number)));
+            }
+        }
+    }
+    if tick && drawn {
+        overlay::key_ui(ui, ticked, number);
+    } else if tick && run.file().is_some() {
+        ui.spinner();
+    }
+}
+
+/// What a row was; a right click offers its command.
+fn title_ui(context: &ViewContext<'_>, run: &Run, ui: &mut Ui) {
+    let title = ui.add(Label::new(&run.title).sense(Sense::click()));
+    let title = match &run.command {
+        Some(command) => title.on_hover_text(format!("{command}\n(right click: copy as a command)")),
+        None => title,
+    };
+    title.context_menu(|ui| {
+        let copy = ui.add_enabled(run.command.is_some(), Button::new("Copy as a command"));
+        if copy.on_hover_text("What makes this run again in a terminal").clicked() {
+            context.commands.send(Command::CopyLineOf(run.number));
+            ui.close();
+        }
+    });
 }
 
 /// Time of day, UTC.
@@ -200,7 +235,7 @@ fn as_text(ledger: &Ledger) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::run::{RunKind, Sources};
+    use super::super::run::Sources;
     use super::*;
 
     #[test]

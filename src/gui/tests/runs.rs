@@ -4,9 +4,9 @@
 
 mod common;
 
-use common::{SIZE, TempFile, Window, click, enter, open, options, state, until};
+use common::{SIZE, TempFile, Window, click, command, enter, open, options, state, until};
 use egui::{Key, Modifiers};
-use egui_kittest::kittest::Queryable;
+use egui_kittest::kittest::{NodeT, Queryable};
 use flqr_core::record::{ColumnMap, ReadOptions, read_log};
 use flqr_gui::{Tab, WindowOptions};
 use serde_json::Value;
@@ -121,4 +121,41 @@ fn a_fit_is_a_row_with_its_log_in_the_hash() {
     let row = rows(&window)[0].clone();
     assert_eq!((&row["kind"], &row["seed"]), (&"fit".into(), &1.into()));
     assert!(row["result"].as_str().unwrap().contains("viscous_nm_s_rad 0.01"), "{row:#}");
+    assert_eq!(row["command"], format!("flqr fit {} --seed 1", log.name()));
+
+    to_runs(&mut window);
+    assert!(window.get_by_label("show run 1").accesskit_node().is_disabled(), "it has no curves");
+    command(&mut window, "copy as a command");
+    let said = state(&window)["message"].as_str().unwrap().to_owned();
+    assert_eq!(said, format!("Copied: {}", row["command"].as_str().unwrap()));
+}
+
+#[test]
+fn a_recording_is_drawn_from_its_file_and_a_missing_one_is_said() {
+    let rows: String = (0..50).map(|i| format!("{},{}\n", 0.01 * f64::from(i), f64::from(i % 7))).collect();
+    let recording = TempFile::new("drawn.csv", &format!("time_s,x_m\n{rows}"));
+    let row = |number: u64, file: &str| {
+        serde_json::json!({
+            "number": number, "unix_s": 7, "kind": "recording", "title": "CAN", "seed": null, "sources": "0",
+            "made_with": { "recording.file": file }, "result": "", "note": "",
+        })
+    };
+    let rows = serde_json::json!([row(1, recording.name()), row(2, "/nowhere/at.csv")]);
+    let text =
+        serde_json::json!({ "format": "flqr-session", "version": 1, "runs": { "last": 2, "rows": rows } });
+    let session = TempFile::new("drawn.flqr-session", &text.to_string());
+    let mut window = open(WindowOptions { session: Some(session.0.clone()), ..options(Tab::Runs) }, SIZE);
+    until(&mut window, "the rows", |s| s["runs_tab"]["rows"].as_array().unwrap().len() == 2);
+    window.run_steps(2);
+    click(&mut window, "show run 1");
+    until(&mut window, "its curves", |s| s["runs_tab"]["rows"][0]["values"] == 100);
+    window.run_steps(2);
+    window.get_by_label("curve to compare");
+    window.get_by_label("shift of run 1");
+    click(&mut window, "show run 2");
+    let said = until(&mut window, "the refusal", |s| {
+        s["message"].as_str().is_some_and(|message| message.contains("Run 2 cannot be drawn"))
+    });
+    assert!(said["message"].as_str().unwrap().contains("/nowhere/at.csv could not be opened"), "{said:#}");
+    assert_eq!(said["runs_tab"]["shown"], serde_json::json!([1]));
 }

@@ -222,6 +222,53 @@ fn runs_are_replaced_by_those_of_a_file_after_a_question_and_come_back_by_undo()
 }
 
 #[test]
+fn a_session_brings_the_logs_of_the_refine_page_back() {
+    let folder = Folder::new("logs");
+    let [run, held] = ["run.csv", "held.csv"].map(|name| {
+        let path = folder.0.join(name);
+        std::fs::write(&path, "speed_rad_s,torque_nm\n-2,-0.1\n-1,-0.1\n1,0.1\n2,0.1\n").unwrap();
+        path
+    });
+    let missing = folder.0.join("gone.csv");
+    let logs = json!([
+        { "path": run, "held_out": false }, { "path": held, "held_out": true }, { "path": missing, "held_out": false },
+    ]);
+    let file = folder.0.join("with-logs.flqr-session");
+    let text = json!({ "format": "flqr-session", "version": 1, "refine_logs": logs });
+    std::fs::write(&file, text.to_string()).unwrap();
+    let mut window = open(WindowOptions { session: Some(file), ..folder.options() }, SIZE);
+    let found = until(&mut window, "the logs", |s| {
+        s["refine_tab"]["logs"].as_array().is_some_and(|logs| logs.len() == 3 && logs[1]["rows"] == 4)
+    });
+    let logs = found["refine_tab"]["logs"].as_array().unwrap();
+    let held_out: Vec<_> = logs.iter().map(|log| log["held_out"].clone()).collect();
+    assert_eq!(held_out, [json!(false), json!(true), json!(false)], "{found:#}");
+    // What is kept of it has them again.
+    until_kept(&mut window, &folder.running(), "gone.csv");
+}
+
+#[test]
+fn effects_of_the_model_are_seen_switched_and_taken_out_with_undo() {
+    let effects = "[[effects]]\nid = \"cogging\"\nmotor = \"left\"\norder_1 = 14\ncos_1_nm = 0.002\nsin_1_nm = -0.008\n";
+    let model = Model::from_toml(&format!("{ROBOT}{effects}"), "effects").unwrap();
+    let mut window = open(WindowOptions { model, ..options(Tab::Tune) }, vec2(1280.0, 1600.0));
+    window.get_by_label("Effects").scroll_to_me();
+    window.run_steps(3);
+    window.get_by_label("cogging of the left motor");
+    window.get_by_label_contains("0.008");
+    click(&mut window, "cancel cogging of the left motor");
+    assert_eq!(state(&window)["undo"], json!(["effects"]));
+    click(&mut window, "remove cogging of the left motor");
+    assert_eq!(state(&window)["undo"], json!(["effects", "effects"]));
+    assert!(window.query_by_label("cogging of the left motor").is_none());
+    for _ in 0..2 {
+        keys(&mut window, Modifiers::COMMAND, Key::Z);
+    }
+    window.get_by_label("cogging of the left motor");
+    assert_eq!(state(&window)["unsaved_changes"], false);
+}
+
+#[test]
 fn a_closed_window_leaves_its_layout_and_asks_nothing() {
     let folder = Folder::new("closed");
     {

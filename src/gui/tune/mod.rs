@@ -1,6 +1,7 @@
 //! The *Tune* page: weights and gains at the left, the live robot in the middle, the model at the right.
 
 mod compare;
+mod effects;
 mod gains;
 mod live_plots;
 mod margins;
@@ -136,6 +137,7 @@ impl TuneTab {
     fn model_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
         self.files.ui(context, ui);
         self.parameters.ui(context, ui);
+        effects::ui(context, ui);
     }
 
     /// The live robot above what the design predicts.
