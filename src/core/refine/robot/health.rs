@@ -13,6 +13,9 @@ use super::trace::Trace;
 const STILL_MOTOR_RAD: f64 = 0.1;
 const STILL_PITCH_RAD: f64 = 0.005;
 
+/// Share by which the way may be off from what the wheels say: beyond it the radius is another.
+const OTHER_RADIUS: f64 = 0.05;
+
 /// Shortest log that can answer, s, and longest time between its rows, s.
 const SHORTEST_S: f64 = 8.0;
 const SLOWEST_S: f64 = 0.0101;
@@ -91,6 +94,41 @@ fn sums(column: &[f64], lag: usize, dt_s: f64) -> Vec<f64> {
     (lag..column.len()).step_by(lag.div_ceil(2)).map(|i| running[i] - running[i - lag]).collect()
 }
 
+/// A column that has another slope over what it ought to follow, or does not follow it.
+fn compared(column: &str, (slope, correlation): (f64, f64), of: &str) -> Option<HealthFinding> {
+    let problem = if correlation < -0.7 {
+        format!("runs against {of}: its sign is wrong")
+    } else if correlation.abs() < 0.5 {
+        format!("does not follow {of} (correlation {correlation:.2}): a dead or mistaken sensor")
+    } else if slope.abs() > 1.33 || slope.abs() / correlation.powi(2) < 0.75 {
+        // Noise of the other column flattens the slope, by no more than the correlation says.
+        format!("is {slope:.3} times what {of} says: its unit is wrong")
+    } else {
+        return None;
+    };
+    let mend = "map the column with the right factor, --map COLUMN=COLUMN*FACTOR";
+    Some(finding(Severity::Error, column, problem, mend))
+}
+
+/// A way that the declared wheels cannot have rolled; `rolled` is what they say.
+fn other_wheels(way: &[f64], rolled: &[f64], radius_m: f64) -> Option<HealthFinding> {
+    let (slope, correlation) = relation(rolled, way);
+    let least = slope / correlation.powi(2);
+    if correlation < 0.9 || slope < 1.0 + OTHER_RADIUS && least > 1.0 - OTHER_RADIUS {
+        return None;
+    }
+    let problem = format!(
+        "is {slope:.3} times what wheel_radius_m = {radius_m} of the model makes of the motors' angles and the pitch: \
+         the log is of other wheels"
+    );
+    let mend = format!(
+        "put wheel_radius_m = {:.4} into the model, or map the column, --map x_m=x_m*{:.4}",
+        slope * radius_m,
+        1.0 / slope
+    );
+    Some(finding(Severity::Error, "x_m", problem, &mend))
+}
+
 fn of_signals(log: &Log, readings: &Readings, robot: &RobotModel) -> Vec<HealthFinding> {
     let mut found = Vec::new();
     let lag = ((0.1 / readings.dt_s) as usize).max(2);
@@ -108,49 +146,30 @@ fn of_signals(log: &Log, readings: &Readings, robot: &RobotModel) -> Vec<HealthF
         ));
         return found;
     }
-    let mut compare = |column: &str, (slope, correlation): (f64, f64), of: &str| {
-        let problem = if correlation < -0.7 {
-            format!("runs against {of}: its sign is wrong")
-        } else if correlation.abs() < 0.5 {
-            format!("does not follow {of} (correlation {correlation:.2}): a dead or mistaken sensor")
-        } else if slope.abs() > 1.33 || slope.abs() / correlation.powi(2) < 0.75 {
-            // Noise of the other column flattens the slope, by no more than the correlation says.
-            format!("is {slope:.3} times what {of} says: its unit is wrong")
-        } else {
-            return;
-        };
-        found.push(finding(
-            Severity::Error,
-            column,
-            problem,
-            "map the column with the right factor, --map COLUMN=COLUMN*FACTOR",
-        ));
-    };
-    compare(
-        "pitch_rate_rad_s",
-        relation(&pitch, &sums(&readings.rate_rad_s, lag, dt_s)),
-        "the change of pitch_rad",
-    );
+    let turned = relation(&pitch, &sums(&readings.rate_rad_s, lag, dt_s));
+    found.extend(compared("pitch_rate_rad_s", turned, "the change of pitch_rad"));
     let names = [
         ["motor_angle_left_rad", "motor_speed_left_rad_s"],
         ["motor_angle_right_rad", "motor_speed_right_rad_s"],
     ];
     let angles = [moved, changes(&readings.angle_rad[1], lag)];
     let speeds = names.map(|[_, name]| log.column(name).map(|speed| sums(speed, lag, dt_s)));
-    for motor in 0..2 {
-        if let Some(speed) = speeds[motor].as_ref().filter(|speed| speed.len() == angles[motor].len()) {
-            compare(
-                names[motor][1],
-                relation(&angles[motor], speed),
-                &format!("the change of {}", names[motor][0]),
-            );
+    for ([angle, name], (turned, speed)) in names.into_iter().zip(angles.iter().zip(&speeds)) {
+        if let Some(speed) = speed.as_ref().filter(|speed| speed.len() == turned.len()) {
+            found.extend(compared(name, relation(turned, speed), &format!("the change of {angle}")));
         }
     }
     let radius = robot.parameters.wheel_radius_m;
     let rolled: Vec<f64> =
         (0..pitch.len()).map(|i| radius * (0.5 * (angles[0][i] + angles[1][i]) + pitch[i])).collect();
-    compare("x_m", relation(&rolled, &changes(&readings.x_m, lag)), "radius × (motor angle + pitch)");
-    compare("motor_angle_right_rad", relation(&angles[0], &angles[1]), "the left motor's angle");
+    let way = changes(&readings.x_m, lag);
+    let of_way = compared("x_m", relation(&rolled, &way), "wheel_radius_m × (motor angle + pitch)");
+    found.extend(of_way.or_else(|| other_wheels(&way, &rolled, radius)));
+    found.extend(compared(
+        "motor_angle_right_rad",
+        relation(&angles[0], &angles[1]),
+        "the left motor's angle",
+    ));
     if let [Some(left), Some(right)] = &speeds
         && left.len() == angles[0].len()
         && right.len() == angles[1].len()

@@ -168,7 +168,8 @@ type Damage = (&'static str, fn(&mut Vec<f64>));
 
 #[test]
 fn damaged_columns_are_told_before_any_effect() {
-    let damages: [Damage; 11] = [
+    let damages: [Damage; 12] = [
+        ("x_m", |column| column.iter_mut().for_each(|v| *v *= 0.8)),
         ("pitch_rate_rad_s", |column| column.iter_mut().for_each(|v| *v = -*v)),
         ("pitch_rate_rad_s", |column| column.iter_mut().for_each(|v| *v = v.to_degrees())),
         ("pitch_rad", |column| column.fill(0.01)),
@@ -241,6 +242,16 @@ fn short_slow_swapped_and_clipped_logs_are_unfit() {
         }
     });
     is_unfit(&case, clipped, "torque_left_nm/torque_right_nm");
+}
+
+#[test]
+fn a_log_of_other_wheels_is_unfit() {
+    for factor in [0.8, 1.2] {
+        let mut case = cases::clean(0, 0.0);
+        let log = log(&case);
+        case.declared.radius *= factor;
+        is_unfit(&case, log, "wheel_radius_m");
+    }
 }
 
 #[test]
