@@ -1,9 +1,11 @@
 //! Accuracy of the refinement over the cases of the independent generator, as a table.
 //!
-//! `cargo bench -p flqr-core --bench undeclared -- [family…] [--first ROUND] [--rounds N] [--noise FACTOR] [--verbose]`;
+//! `cargo bench -p flqr-core --bench undeclared -- [family…] [--first ROUND] [--rounds N] [--noise FACTOR]
+//! [--seconds LENGTH] [--alone] [--verbose]`;
 //! families: clean, tolerance, single, quarter, pairs, outside, the same of a motor on a bench behind `bench-` (`bench` for
-//! all of those), or the id of an effect. Rounds 0 to 9 are those that the method was tuned on; figures are told from
-//! round 10 on.
+//! all of those), or the id of an effect. Rounds 0 to 29 are those that were looked at while the method was made; figures
+//! are told from round 30 on. `--seconds` makes logs of that length without another log beside them, so that the last
+//! third is held out; `--alone` judges one case at a time, which is what its time is to be measured with.
 
 #![expect(clippy::print_stdout, clippy::disallowed_methods, reason = "a table for people, with its time")]
 #[path = "../tests/undeclared/generator/mod.rs"]
@@ -25,8 +27,8 @@ use generator::{Case, Conditions, cases};
 /// Clean robots of a round, and as many within the tolerances.
 const CLEAN: u64 = 8;
 
-/// Length of a log of a motor.
-const BENCH_SECONDS: f64 = 40.0;
+/// Length of a log.
+const SECONDS: f64 = 40.0;
 
 /// A case with its truth.
 struct Trial {
@@ -37,8 +39,8 @@ struct Trial {
     ids: Vec<&'static str>,
     /// Id, key and true value.
     sizes: Vec<(&'static str, &'static str, f64)>,
-    /// The log, or the held-out one, with a factor on its noise.
-    record: Box<dyn Fn(bool, f64) -> Option<Recording> + Send + Sync>,
+    /// The log, or the held-out one, with a factor on its noise, of so many seconds.
+    record: Box<dyn Fn(bool, f64, f64) -> Option<Recording> + Send + Sync>,
 }
 
 impl From<Case> for Trial {
@@ -54,8 +56,8 @@ impl From<Case> for Trial {
             model: case.declared.model_file(),
             ids: case.faults.iter().filter_map(|fault| fault.id()).collect(),
             sizes: case.faults.iter().filter_map(size).collect(),
-            record: Box::new(move |held_out, noise| {
-                case.record(held_out, Conditions { noise, ..Conditions::default() })
+            record: Box::new(move |held_out, noise, seconds| {
+                case.record(held_out, Conditions { noise, seconds, ..Conditions::default() })
             }),
         }
     }
@@ -73,7 +75,7 @@ impl From<BenchCase> for Trial {
             model: case.model_file(),
             ids: case.ids(),
             sizes: case.flaws.iter().filter_map(size).collect(),
-            record: Box::new(move |held_out, noise| Some(case.record(held_out, BENCH_SECONDS, noise))),
+            record: Box::new(move |held_out, noise, seconds| Some(case.record(held_out, seconds, noise))),
         }
     }
 }
@@ -96,12 +98,22 @@ struct Wanted {
     first: u64,
     rounds: u64,
     noise: f64,
+    seconds: Option<f64>,
+    threads: NonZeroUsize,
     verbose: bool,
 }
 
 impl Wanted {
     fn new() -> Self {
-        let mut wanted = Self { families: Vec::new(), first: 0, rounds: 2, noise: 1.0, verbose: false };
+        let mut wanted = Self {
+            families: Vec::new(),
+            first: 0,
+            rounds: 2,
+            noise: 1.0,
+            seconds: None,
+            threads: NonZeroUsize::new(2).expect("two"),
+            verbose: false,
+        };
         let mut words = std::env::args().skip(1);
         while let Some(word) = words.next() {
             let mut number = || words.next().and_then(|n| n.parse::<f64>().ok()).expect("a number");
@@ -109,6 +121,8 @@ impl Wanted {
                 "--first" => wanted.first = number() as u64,
                 "--rounds" => wanted.rounds = number() as u64,
                 "--noise" => wanted.noise = number(),
+                "--seconds" => wanted.seconds = Some(number()),
+                "--alone" => wanted.threads = NonZeroUsize::MIN,
                 "--verbose" => wanted.verbose = true,
                 "--bench" => {}
                 _ => wanted.families.push(word),
@@ -160,16 +174,18 @@ impl Wanted {
     }
 }
 
-fn log(case: &Trial, held_out: bool, noise: f64) -> Option<Log> {
-    Some(Log::from_columns(case.name.clone(), (case.record)(held_out, noise)?))
-}
-
-fn judge(family: &'static str, case: &Trial, noise: f64) -> Option<Outcome> {
-    let (training, held_out) = (log(case, false, noise)?, log(case, true, noise)?);
+fn judge(family: &'static str, case: &Trial, wanted: &Wanted) -> Option<Outcome> {
+    let seconds = wanted.seconds.unwrap_or(SECONDS);
+    let log = |held_out| {
+        let recording = (case.record)(held_out, wanted.noise, seconds)?;
+        Some(Log::from_columns(case.name.clone(), recording))
+    };
+    let training = log(false)?;
+    let held_out = if wanted.seconds.is_none() { vec![log(true)?] } else { Vec::new() };
     let model = Model::from_toml(&case.model, "declared").expect("the generator writes models");
     let start = Instant::now();
     let found =
-        refine(&model, &[training], &[held_out], &Options::default(), &mut |_| ControlFlow::Continue(()))
+        refine(&model, &[training], &held_out, &Options::default(), &mut |_| ControlFlow::Continue(()))
             .expect("a whole log");
     let seconds = start.elapsed().as_secs_f64();
     let ids = &case.ids;
@@ -241,9 +257,8 @@ fn told(found: &Refinement, ratio: f64) -> String {
 fn main() {
     let wanted = Wanted::new();
     let list = wanted.cases();
-    let threads = NonZeroUsize::new(2).expect("two");
-    let outcomes = flqr_core::parallel::map(&list, threads, |(family, case)| {
-        let outcome = judge(family, case, wanted.noise);
+    let outcomes = flqr_core::parallel::map(&list, wanted.threads, |(family, case)| {
+        let outcome = judge(family, case, &wanted);
         if let Some(outcome) = &outcome
             && wanted.verbose
         {

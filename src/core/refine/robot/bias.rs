@@ -3,15 +3,16 @@
 //! Noise of the sensors is in the columns too, held readings are filled in, friction sticks: what the regression says of a
 //! simulated robot with the effects that were found is compared with what that robot has.
 
+use std::num::NonZeroUsize;
+
 use crate::effects::{EffectKind, Term};
 use crate::parallel;
 
 use super::candidates::Candidate;
-use super::chance::THREADS;
 use super::channels::Channels;
 use super::found;
 use super::nuisance::nuisances;
-use super::search::{Fit, Search, whitened};
+use super::search::{Chance, Fit, Search, whitened};
 use super::twin::{Levels, Twin};
 
 /// Simulated robots.
@@ -43,10 +44,11 @@ pub(super) fn shifts(
     };
     let seeds: Vec<u64> =
         (1..=ROBOTS).map(|robot| seed.wrapping_mul(ROBOTS + 7).wrapping_sub(robot)).collect();
-    let found: Vec<Vec<f64>> = parallel::map(&seeds, THREADS, |&seed| refitted(&known, twin, levels, seed))
-        .into_iter()
-        .flatten()
-        .collect();
+    let found: Vec<Vec<f64>> =
+        parallel::map(&seeds, super::THREADS, |&seed| refitted(&known, twin, levels, seed))
+            .into_iter()
+            .flatten()
+            .collect();
     let count = found.len() as f64;
     if count < 3.0 {
         return None;
@@ -70,11 +72,11 @@ fn refitted(known: &Found<'_>, twin: &Twin<'_>, levels: Levels, seed: u64) -> Op
     let mut picks: Vec<Candidate> = known.picks.iter().map(again).collect();
     let mut free = nuisances(&trace, twin.known);
     let plain = Channels::new(&trace, &target);
-    whitened(&mut picks, &mut free, &plain);
-    let rough = Search::new(&trace, &plain, &free, &[], &target, &|| 0.0);
+    whitened(&mut picks, &mut free, &plain, NonZeroUsize::MIN);
+    let rough = Search::new(&trace, &plain, &free, &[], &target, &Chance::default);
     let left = rough.left_raw(&picks, &rough.fit(&picks)?.judged.coefficients);
     let channels = Channels::new(&trace, &left);
-    whitened(&mut picks, &mut free, &channels);
-    let search = Search::new(&trace, &channels, &free, &[], &target, &|| 0.0);
+    whitened(&mut picks, &mut free, &channels, NonZeroUsize::MIN);
+    let search = Search::new(&trace, &channels, &free, &[], &target, &Chance::default);
     Some(search.fit(&picks)?.judged.coefficients.split_off(free.len()))
 }

@@ -1,6 +1,9 @@
 //! What is tried: every kind of the library that can be in a robot, at shapes that its range of motion can show.
 
+use std::num::NonZeroUsize;
+
 use crate::effects::{EffectKind, Form, Grid, KINDS, MachineKind, Parameter, Step};
+use crate::parallel;
 
 use super::trace::{Pair, Trace};
 
@@ -61,6 +64,11 @@ impl Candidate {
         self.kind.shapes().enumerate().map(of).collect()
     }
 
+    /// How many numbers it has beyond one size.
+    pub(super) fn parameters(&self) -> usize {
+        self.shape.len() + self.pairs.len() - 1
+    }
+
     /// Whether it has a shape that is refined.
     pub(super) fn is_flexible(&self) -> bool {
         self.kind.shapes().any(|parameter| parameter.step != Step::Fixed)
@@ -108,17 +116,19 @@ const WAVES_M: [f64; 3] = [2.5, 0.1, 1.1];
 const MOST_PLACES: f64 = 40.0;
 
 /// Everything to try, apart from what depends on a moment.
-pub(super) fn library(trace: &Trace) -> Vec<Candidate> {
+pub(super) fn library(trace: &Trace, threads: NonZeroUsize) -> Vec<Candidate> {
     let reach = Reach::new(trace);
-    let mut found = Vec::new();
+    let mut wanted = Vec::new();
     for kind in KINDS.iter().copied().filter(|kind| kind.is_on(MachineKind::Robot)) {
         for &form in kind.trial.forms {
             let shapes = if form == Form::Wave { waves() } else { reach.shapes(kind) };
-            let candidates = shapes.into_iter().map(|shape| Candidate::new(trace, kind, form, shape));
-            found.extend(candidates.filter(|candidate| !candidate.pairs.is_empty()));
+            wanted.extend(shapes.into_iter().map(|shape| (kind, form, shape)));
         }
     }
-    found
+    let made = parallel::map(&wanted, threads, |(kind, form, shape)| {
+        Candidate::new(trace, kind, *form, shape.clone())
+    });
+    made.into_iter().filter(|candidate| !candidate.pairs.is_empty()).collect()
 }
 
 fn waves() -> Vec<Vec<f64>> {

@@ -77,6 +77,11 @@ impl Channels {
         pair[0].iter().zip(&pair[1]).map(|(r1, r2)| r1 - self.kappa * r2).collect()
     }
 
+    /// Rows of the trace that are held out, in the order of what is [`Channels::unseen`].
+    pub(super) fn held_out(&self) -> &[usize] {
+        &self.held_out
+    }
+
     /// The white rows of a column where it is held out.
     pub(super) fn unseen(&self, pair: &Pair) -> Vec<f64> {
         self.whitened(pair, &self.held_out)

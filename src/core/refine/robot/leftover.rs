@@ -13,9 +13,37 @@ use super::trace::{Pair, Part, Trace};
 const WHOLE: f64 = 1.10;
 const MOMENT: f64 = 8.0;
 const MOMENT_S: f64 = 0.25;
+/// Variance of the white rows above which there is structure on rows held out, whose noise may be another.
+const ONLY_HELD_OUT: f64 = 2.0;
+
+/// What is left beyond the noise.
+pub(super) struct Structure {
+    pub(super) told: Unexplained,
+    /// Whether a wave over the motor's angle is.
+    pub(super) is_wave: bool,
+}
+
+/// What is left beyond the noise on rows that are held out only, as they may have what the others do not reach.
+pub(super) fn only_held_out(search: &Search<'_>, fit: &Fit) -> Option<Unexplained> {
+    let left = search.channels.unseen(&search.left_raw(&search.picks, &fit.judged.coefficients));
+    let power = left.iter().map(|v| v * v).sum::<f64>() / left.len().max(1) as f64;
+    if power < ONLY_HELD_OUT {
+        return None;
+    }
+    let mut shares = dependences(search, &left, search.channels.held_out());
+    shares.truncate(3);
+    let first = shares.first().map_or("nothing that was recorded", |(name, _)| name.as_str());
+    let more = 100.0 * (power - 1.0);
+    let description = format!(
+        "{more:.0} % more than noise is left on the rows held out, which have what the rows of the fit do not; it \
+         depends most on {first}"
+    );
+    let (depends_on, shares) = shares.into_iter().unzip();
+    Some(Unexplained { depends_on, shares, description })
+}
 
 /// What is left beyond the noise; none where there is nothing.
-pub(super) fn structure(search: &Search<'_>, fit: &Fit) -> Option<Unexplained> {
+pub(super) fn structure(search: &Search<'_>, fit: &Fit) -> Option<Structure> {
     let left = search.left(&search.picks, &fit.judged.coefficients);
     let whole = fit.score / search.rows() as f64;
     let (worst, at_s) = worst_moment(search, &left);
@@ -23,7 +51,7 @@ pub(super) fn structure(search: &Search<'_>, fit: &Fit) -> Option<Unexplained> {
     if whole < WHOLE && worst < MOMENT && hum.is_none() && order.is_none() {
         return None;
     }
-    let mut shares = dependences(search, &left);
+    let mut shares = dependences(search, &left, search.channels.rows());
     for (name, line) in [("time_s", &hum), ("motor_angle_rad", &order)] {
         // What is slow has lines too.
         if let Some((_, share)) = line
@@ -53,7 +81,7 @@ pub(super) fn structure(search: &Search<'_>, fit: &Fit) -> Option<Unexplained> {
     let more = 100.0 * (whole - 1.0).max(0.0);
     let description = format!("{more:.0} % more than noise is left{place}; it depends most on {first}");
     let (depends_on, shares) = shares.into_iter().unzip();
-    Some(Unexplained { depends_on, shares, description })
+    Some(Structure { told: Unexplained { depends_on, shares, description }, is_wave: order.is_some() })
 }
 
 /// Largest mean square over a short time, and when that is.
@@ -80,8 +108,7 @@ const VARIABLES: [Variable; 7] = [
 ];
 
 /// Share of the left rows that bins of each variable explain, in both channels and beyond what chance does.
-fn dependences(search: &Search<'_>, left: &[f64]) -> Vec<(String, f64)> {
-    let rows = search.channels.rows();
+fn dependences(search: &Search<'_>, left: &[f64], rows: &[usize]) -> Vec<(String, f64)> {
     let half = left.len() / 2;
     let total: f64 = left.iter().map(|v| v * v).sum();
     let mut found: Vec<(String, f64)> = VARIABLES

@@ -26,6 +26,7 @@ mod tried;
 mod twin;
 mod uncertainty;
 
+use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
 
 use crate::effects::{Form, Moment};
@@ -43,7 +44,7 @@ use channels::Channels;
 use motion::Readings;
 pub(super) use motion::{at_even_times, fresh_rows};
 use nuisance::{KEYS, Known, Nuisance, nuisances};
-use search::{Fit, Search, whitened};
+use search::{Chance, Fit, Search, whitened};
 use trace::{Pair, Part, Trace};
 use twin::{Levels, Twin};
 
@@ -52,6 +53,9 @@ const EXPLAINED: f64 = 0.95;
 /// The same where no more than so much of the noise's power is left.
 const MOST_OF_IT: f64 = 0.5;
 const LITTLE: f64 = 0.1;
+
+/// Threads that share the work; no answer depends on them.
+const THREADS: NonZeroUsize = NonZeroUsize::new(4).expect("four");
 
 /// Told the share of the work that is done; may end it.
 type Watch<'a> = &'a mut dyn FnMut(f64) -> ControlFlow<()>;
@@ -149,18 +153,20 @@ pub(super) fn refine(
     }
     let known = Known { tolerances: &model.tolerance, estimate: &options.estimate };
     let mut channels = Channels::new(&trace, &trace.residual());
-    let chance = std::cell::OnceCell::new();
+    let chance = std::sync::OnceLock::new();
     for pass in 0..2 {
         report(watch, 0.1 + 0.45 * f64::from(pass))?;
         let target = trace.residual();
-        let (mut free, mut tried) = (nuisances(&trace, known), library(&trace));
-        whitened(&mut tried, &mut free, &channels);
+        let (mut free, mut tried) = (nuisances(&trace, known), library(&trace, THREADS));
+        whitened(&mut tried, &mut free, &channels, THREADS);
         let by_chance =
             || *chance.get_or_init(|| by_chance(&trace, &channels, &free, &target, (known, options.seed)));
         let mut search = Search::new(&trace, &channels, &free, &tried, &target, &by_chance);
+        search.threads = THREADS;
         search.run(&mut |share| report(watch, 0.1 + 0.45 * f64::from(pass) + 0.4 * share))?;
         search.settle();
         if pass == 1 {
+            search.simplify();
             search.merge_pushes();
             search.confirm();
         }
@@ -190,19 +196,19 @@ fn twin<'a>(
     Some((twin, levels))
 }
 
-/// The gain that clean robots reach by chance.
+/// What clean robots reach by chance.
 fn by_chance(
     trace: &Trace<'_>,
     channels: &Channels,
     free: &[Nuisance],
     target: &Pair,
     (known, seed): (Known<'_>, u64),
-) -> f64 {
-    let search = Search::new(trace, channels, free, &[], target, &|| 0.0);
-    let Some(bare) = search.fit(&[]) else { return 0.0 };
+) -> Chance {
+    let search = Search::new(trace, channels, free, &[], target, &Chance::default);
+    let Some(bare) = search.fit(&[]) else { return Chance::default() };
     let corrections: Vec<(&Nuisance, f64)> = free.iter().zip(bare.judged.coefficients).collect();
     twin(trace, known, channels, &corrections, seed)
-        .map_or(0.0, |(twin, levels)| chance::largest_gain(&twin, levels, seed))
+        .map_or(Chance::default(), |(twin, levels)| chance::largest_gain(&twin, levels, seed))
 }
 
 /// Takes off what the chain itself adds to the sizes.
@@ -245,11 +251,16 @@ fn answer(
     let (lacking, leftover) = (bare.score / rows - 1.0, fit.score / rows - 1.0);
     let structure = leftover::structure(search, fit);
     let share = 1.0 - leftover / lacking;
-    // A moment that is left beside what explains most of it does not make that doubtful.
+    // A moment that is left beside what explains most of it does not make that doubtful. A wave over the motor's angle
+    // does: of what is said to depend on a place nothing is left that depends on it.
+    let is_refuted = structure.as_ref().is_some_and(|structure| structure.is_wave)
+        && search
+            .picks
+            .iter()
+            .any(|pick| pick.kind.by_angle() || pick.kind.trial.forms.contains(&Form::Wave));
     let explained = search.picks.is_empty()
         || structure.is_none()
-        || share > EXPLAINED
-        || leftover < LITTLE && share > MOST_OF_IT;
+        || !is_refuted && (share > EXPLAINED || leftover < LITTLE && share > MOST_OF_IT);
     let picks = if explained { search.picks.as_slice() } else { &[] };
     let used = if explained { fit } else { bare };
     let sized = if picks.is_empty() { used.clone() } else { unbiased(search, used.clone(), known, seed) };
@@ -260,7 +271,12 @@ fn answer(
     let (left_before, left_after) = (residual(&[], bare), residual(picks, used));
     let before = errors(trace, search.channels, &left_before);
     let after = errors(trace, search.channels, &left_after);
-    let verdict = match (effects.is_empty(), &structure) {
+    let unexplained = match structure {
+        Some(structure) => Some(structure.told),
+        None if effects.is_empty() => leftover::only_held_out(search, fit),
+        None => None,
+    };
+    let verdict = match (effects.is_empty(), &unexplained) {
         (false, _) => Verdict::EffectsFound,
         (true, Some(_)) => Verdict::UnexplainedResidual,
         (true, None) => Verdict::ModelAdequate,
@@ -274,7 +290,7 @@ fn answer(
         effects,
         before,
         after,
-        unexplained: structure.unwrap_or_default(),
+        unexplained: unexplained.unwrap_or_default(),
         candidates,
         closed_loop: None,
         next_experiment: None,

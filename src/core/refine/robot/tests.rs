@@ -3,6 +3,7 @@
 use std::ops::ControlFlow;
 
 use super::*;
+use crate::effects::{Effect, MachineKind};
 use crate::friction::{Stribeck, StribeckParameters};
 use crate::model_file::{Rig, presets};
 use crate::robot::Motor;
@@ -58,8 +59,8 @@ fn corrected(model: &Model, log: &Log, estimate: &[String]) -> Vec<Corrected> {
     let target = trace.residual();
     let channels = Channels::new(&trace, &target);
     let mut free = nuisances(&trace, Known { tolerances: &model.tolerance, estimate });
-    whitened(&mut [], &mut free, &channels);
-    let search = Search::new(&trace, &channels, &free, &[], &target, &|| 0.0);
+    whitened(&mut [], &mut free, &channels, THREADS);
+    let search = Search::new(&trace, &channels, &free, &[], &target, &Chance::default);
     corrections(&free, &search.fit(&[]).unwrap())
 }
 
@@ -81,6 +82,34 @@ fn friction_of_both_motors_is_told_per_motor() {
     assert!((more / MORE - 1.0).abs() < 0.3, "{more} of {MORE}");
     let [low, high] = viscous.ci95.unwrap();
     assert!((0.5 * (low + high) - viscous.value).abs() < 1e-9, "{low} {high}");
+}
+
+/// A rope that does not pull back is a slope, which is simpler.
+#[test]
+fn of_equal_effects_the_simpler_is_named() {
+    let model = presets::paper();
+    for (id, sizes, told) in
+        [("ground_slope", vec![0.03], "ground_slope"), ("tether_spring", vec![12.0, 0.5], "tether_spring")]
+    {
+        let mut actual = model.clone();
+        let Rig::Robot(robot) = &mut actual.rig else { panic!("the paper's model is a robot") };
+        let kind = crate::effects::kind(id).unwrap();
+        robot.effects.extend(Effect::estimated(kind, MachineKind::Robot, None, &[], &sizes));
+        let robot = model.robot().unwrap();
+        let trace =
+            Trace::new(robot, vec![Readings::new(&run(&actual, 20.0)).unwrap().acting(robot)], vec![]);
+        let target = trace.residual();
+        let channels = Channels::new(&trace, &target);
+        let known = Known { tolerances: &model.tolerance, estimate: &[] };
+        let (mut free, mut tried) = (nuisances(&trace, known), library(&trace, THREADS));
+        tried.retain(|candidate| ["ground_slope", "tether_spring"].contains(&candidate.kind.id));
+        whitened(&mut tried, &mut free, &channels, THREADS);
+        let mut search = Search::new(&trace, &channels, &free, &tried, &target, &Chance::default);
+        search.picks =
+            tried.iter().filter(|candidate| candidate.kind.id == "tether_spring").cloned().collect();
+        search.simplify();
+        assert_eq!(search.picks.iter().map(|pick| pick.kind.id).collect::<Vec<_>>(), [told]);
+    }
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Logs as rows of r1 and r2, and effects as columns over the same rows.
 
 use std::f64::consts::TAU;
+use std::sync::OnceLock;
 
 use crate::effects::{Action, Effect, EffectKind, Form, Law, Machine, Moment, Place, Term};
 use crate::model_file::RobotModel;
@@ -25,6 +26,8 @@ struct Piece {
     readings: Readings,
     motion: Motion,
     parts: Vec<Part>,
+    /// r1 and r2 of the declared model alone, once somebody asks for them.
+    plain: OnceLock<Pair>,
 }
 
 /// All rows.
@@ -69,7 +72,7 @@ impl<'a> Trace<'a> {
         let pieces = logs
             .map(|(readings, fit)| {
                 let motion = Motion::new(&readings, robot, &kernel, None, 0.0);
-                Piece { parts: parts(&readings, fit), readings, motion }
+                Piece { parts: parts(&readings, fit), readings, motion, plain: OnceLock::new() }
             })
             .collect();
         let mut trace = Self { robot, machine: Machine::robot(robot), kernel, pieces };
@@ -114,7 +117,8 @@ impl<'a> Trace<'a> {
         let kernel = Kernel::new(logs.first().map_or(1e-3, |readings| readings.dt_s));
         let piece = |readings: Readings| {
             let motion = Motion::new(&readings, robot, &kernel, None, 0.0);
-            Piece { parts: vec![Part::Fit; kernel.count(readings.rows())], readings, motion }
+            let parts = vec![Part::Fit; kernel.count(readings.rows())];
+            Piece { parts, readings, motion, plain: OnceLock::new() }
         };
         let pieces = logs.into_iter().map(piece).collect();
         Self { robot, machine: Machine::robot(robot), kernel, pieces }
@@ -259,10 +263,11 @@ impl<'a> Trace<'a> {
     fn late(&self, delay_s: f64) -> Pair {
         let mut found = [Vec::new(), Vec::new()];
         for piece in &self.pieces {
-            let now = Motion::new(&piece.readings, self.robot, &self.kernel, None, 0.0);
-            let late = Motion::new(&piece.readings, self.robot, &self.kernel, None, delay_s);
+            let residual =
+                |delay_s: f64| Motion::new(&piece.readings, self.robot, &self.kernel, None, delay_s).residual;
+            let (now, late) = (piece.plain.get_or_init(|| residual(0.0)), residual(delay_s));
             for (equation, found) in found.iter_mut().enumerate() {
-                let pairs = now.residual[equation].iter().zip(&late.residual[equation]);
+                let pairs = now[equation].iter().zip(&late[equation]);
                 found.extend(pairs.map(|(now, late)| now - late));
             }
         }

@@ -48,7 +48,7 @@ fn fate(
     if let Some(found) = effects.iter().find(|found| found.ambiguous_with.contains(&kind)) {
         return Fate::NotToldFrom(found.effect.kind());
     }
-    if gain < kind.trial.caution * search.least(bare.score) {
+    if gain < search.least_of(kind, bare.score) {
         Fate::TooSmall
     } else if z < LEAST_Z || effects.is_empty() {
         Fate::NotSure

@@ -6,8 +6,11 @@ mod screen;
 mod selection;
 mod shapes;
 
+use std::num::NonZeroUsize;
+
 use nalgebra::DMatrix;
 
+use crate::parallel;
 use crate::refine::select::{Blocks, Judged, Member};
 
 pub(super) use screen::Screen;
@@ -20,6 +23,8 @@ use super::trace::{Pair, Trace};
 
 /// Price of what is fitted without a block that could judge it, in units of the noise.
 const BRIEF_PRICE: f64 = 12.0;
+/// Share of an effect's power in one block above which the others do not tell of it.
+const ONE_BLOCK: f64 = 0.8;
 /// Seconds of a block, and fewest and most blocks.
 const BLOCK_S: f64 = 5.0;
 const BLOCKS: [usize; 2] = [6, 20];
@@ -36,8 +41,17 @@ pub(super) struct Search<'a> {
     pub(super) picks: Vec<Candidate>,
     /// What was tried first, each alone beside the nuisances.
     pub(super) tried: Vec<(Candidate, Fit)>,
-    /// Gain that clean robots reach by chance.
-    by_chance: &'a dyn Fn() -> f64,
+    /// What clean robots reach by chance.
+    by_chance: &'a (dyn Fn() -> Chance + Sync),
+    /// Threads that share the work; the answer does not depend on them.
+    pub(super) threads: NonZeroUsize,
+}
+
+/// Largest gains as multiples of the least that each needs: of what lasts, and of what is there for a moment.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Chance {
+    pub(super) lasting: f64,
+    pub(super) brief: f64,
 }
 
 /// A fit of nuisances and picks.
@@ -53,9 +67,16 @@ pub(super) struct Fit {
 }
 
 /// Everything to try, and its columns made white.
-pub(super) fn whitened(library: &mut [Candidate], nuisances: &mut [Nuisance], channels: &Channels) {
-    for candidate in library {
-        candidate.white = candidate.pairs.iter().map(|pair| channels.white(pair)).collect();
+pub(super) fn whitened(
+    library: &mut [Candidate],
+    nuisances: &mut [Nuisance],
+    channels: &Channels,
+    threads: NonZeroUsize,
+) {
+    let white = |candidate: &Candidate| candidate.pairs.iter().map(|pair| channels.white(pair)).collect();
+    let columns = parallel::map(library, threads, white);
+    for (candidate, columns) in library.iter_mut().zip(columns) {
+        candidate.white = columns;
     }
     for nuisance in nuisances {
         nuisance.white = channels.white(&nuisance.pair);
@@ -63,13 +84,14 @@ pub(super) fn whitened(library: &mut [Candidate], nuisances: &mut [Nuisance], ch
 }
 
 impl<'a> Search<'a> {
+    /// Works on one thread.
     pub(super) fn new(
         trace: &'a Trace<'a>,
         channels: &'a Channels,
         nuisances: &'a [Nuisance],
         library: &'a [Candidate],
         raw_target: &'a Pair,
-        by_chance: &'a dyn Fn() -> f64,
+        by_chance: &'a (dyn Fn() -> Chance + Sync),
     ) -> Self {
         let rows = channels.rows();
         let seconds = rows.len() as f64 * trace.step_s();
@@ -88,6 +110,7 @@ impl<'a> Search<'a> {
             picks: Vec::new(),
             tried: Vec::new(),
             by_chance,
+            threads: NonZeroUsize::MIN,
         }
     }
 
@@ -175,9 +198,25 @@ impl<'a> Search<'a> {
     /// Whether each column is of something that is there for a moment only.
     fn brief(&self, picks: &[Candidate]) -> Vec<bool> {
         let nuisances = self.nuisances.iter().map(|_| false);
-        nuisances
-            .chain(picks.iter().flat_map(|pick| pick.white.iter().map(|_| pick.kind.trial.brief)))
-            .collect()
+        let of_pick = |pick: &Candidate| {
+            let is_brief = pick.kind.trial.brief || self.is_momentary(pick);
+            std::iter::repeat_n(is_brief, pick.white.len())
+        };
+        nuisances.chain(picks.iter().flat_map(of_pick)).collect()
+    }
+
+    /// Whether this log shows an effect whose size is in its shape, as a limit is, in one block only: no other tells
+    /// of it.
+    pub(super) fn is_momentary(&self, pick: &Candidate) -> bool {
+        if !pick.is_fixed() {
+            return false;
+        }
+        let mut powers = vec![0.0; BLOCKS[1]];
+        for (value, block) in pick.white.iter().flat_map(|column| column.iter().zip(&self.block)) {
+            powers[*block] += value * value;
+        }
+        let most = powers.iter().copied().fold(0.0, f64::max);
+        most > ONE_BLOCK * powers.iter().sum::<f64>()
     }
 
     /// What coefficients of nuisances and picks leave of the white target.

@@ -1,6 +1,7 @@
 //! What a log cannot tell from an effect.
 
 use crate::effects::EffectKind;
+use crate::parallel;
 
 use super::screen::Screen;
 use super::{Candidate, Search};
@@ -29,24 +30,21 @@ impl Search<'_> {
             .filter(|(rival, _)| *rival > 0.6 * gain)
             .collect();
         gains.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let mut found: Vec<&'static EffectKind> = Vec::new();
-        let mut seen: Vec<&'static EffectKind> = Vec::new();
+        let mut best: Vec<(f64, &Candidate)> = Vec::new();
         for (rival, candidate) in gains {
-            if seen.contains(&candidate.kind) {
-                continue;
+            if best.iter().all(|(_, other)| other.kind != candidate.kind) {
+                best.push((rival, candidate));
             }
-            seen.push(candidate.kind);
+        }
+        let nearly = |&(rival, candidate): &(f64, &Candidate)| {
             let mut candidate = candidate.clone();
             if candidate.is_flexible() {
                 self.refine_shape(&screen, &mut candidate, rival);
             }
-            let mut tried = others.to_vec();
-            tried.push(candidate);
-            let kind = tried[tried.len() - 1].kind;
-            if self.fit(&tried).is_some_and(|fit| fit.score < score + NEARLY + NEARLY_SHARE * gain) {
-                found.push(kind);
-            }
-        }
-        found
+            let kind = candidate.kind;
+            let fit = self.fit(&[others, &[candidate]].concat())?;
+            (fit.score < score + NEARLY + NEARLY_SHARE * gain).then_some(kind)
+        };
+        parallel::map(&best, self.threads, nearly).into_iter().flatten().collect()
     }
 }

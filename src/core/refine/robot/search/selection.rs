@@ -1,18 +1,29 @@
 //! Forward selection with swaps and a backward check.
 
+use crate::effects::{EffectKind, Step};
+use crate::parallel;
 use crate::refine::error::RefineError;
 
 use super::screen::Screen;
-use super::{Candidate, Fit, Search};
+use super::{Candidate, Chance, Fit, Search};
 use crate::refine::robot::found::held_out_error;
 
-/// Share of the error on left-out blocks that an effect must explain, and the least in units of the noise.
+/// Share of the error on left-out blocks that an effect must explain, and the least in units of the noise: of one of
+/// which a hundred are tried.
 const LEAST_SHARE: f64 = 0.0027;
 const LEAST_GAIN: f64 = 22.0;
-/// Standard errors above 0 of an effect's size, by the jackknife over blocks.
+/// The least of an effect that is tried once and has no shape to refine, and what a shape adds: the largest of n squares
+/// of normal numbers grows with 2 ln n.
+const LEAST_ALONE: f64 = 14.0;
+const OF_A_SHAPE: f64 = 2.0;
+/// Standard errors above 0 of an effect's size, by the jackknife over blocks, and those of one that explains less than
+/// the least of a hundred.
 pub(in crate::refine::robot) const LEAST_Z: f64 = 3.0;
-/// Least impulse of a push as a share of the weight, s: sticking that lets go looks like a smaller one.
+const SURE_Z: f64 = 6.0;
+/// Least impulse of a push as a share of the weight, s: sticking that lets go looks like a smaller one, which has to be
+/// so many times beyond what clean robots do.
 const LEAST_IMPULSE_S: f64 = 0.003;
+const BEYOND_STICKING: f64 = 1.5;
 /// Time within which pushes are one, s, and the share of their gain that the strongest must have alone.
 const ONE_PUSH_S: f64 = 1.5;
 const MOST_OF_A_PUSH: f64 = 0.9;
@@ -24,15 +35,30 @@ const REFINED: usize = 5;
 /// Gain in units of the noise below which nothing is looked at, and share of the leader's below which no shape is refined.
 const LEAST_LOOK: f64 = 8.0;
 const WORTH_REFINING: f64 = 0.3;
-/// What a shape parameter and a unit of caution cost against a rival, in units of the noise.
+/// What a parameter and a unit of caution cost against a rival, in units of the noise.
 const HANDICAP: [f64; 2] = [3.0, 10.0];
 /// Gain in units of the least one up to which clean robots are asked what chance does.
 const DOUBT: f64 = 3.0;
 
+/// What a candidate costs against a rival that does as well.
+fn handicap(pick: &Candidate) -> f64 {
+    HANDICAP[0] * pick.parameters() as f64 + HANDICAP[1] * (pick.kind.trial.caution - 1.0)
+}
+
 impl Search<'_> {
-    /// Gain below which nothing is named.
+    /// Gain below which nothing of which a hundred are tried is named.
     pub(in crate::refine::robot) fn least(&self, score: f64) -> f64 {
         LEAST_GAIN.max(LEAST_SHARE * score)
+    }
+
+    /// Gain below which nothing of a kind is named: the more of it are tried, the more one of them gains by chance.
+    pub(in crate::refine::robot) fn least_of(&self, kind: &EffectKind, score: f64) -> f64 {
+        let tried = self.library.iter().filter(|candidate| candidate.kind == kind).count().max(1);
+        let shapes = kind.shapes().filter(|parameter| parameter.step != Step::Fixed).count();
+        let alone = LEAST_ALONE + 2.0 * libm::log(tried as f64) + OF_A_SHAPE * shapes as f64;
+        let is_plain = kind.trial.caution <= 1.0;
+        let share = if is_plain { (alone / LEAST_GAIN).min(1.0) } else { 1.0 };
+        kind.trial.caution * share * self.least(score)
     }
 
     /// Finds effects until none is worth its name.
@@ -66,17 +92,23 @@ impl Search<'_> {
     /// Whether the last pick is.
     fn is_worth(&self, picks: &[Candidate], before: &Fit, with: &Fit) -> bool {
         let Some(last) = picks.last() else { return false };
+        // What the least is to a gain: by how much it is beyond.
+        let gain = before.score - with.score;
+        let beyond = gain / self.least_of(last.kind, before.score);
+        if beyond <= 1.0 {
+            return false;
+        }
         if last.kind.trial.brief {
             let impulse = with.judged.coefficients[with.members.len() - 1].abs() * last.shape[1];
-            if impulse < LEAST_IMPULSE_S * self.trace.machine.weight_n() {
-                return false;
-            }
+            let is_strong = impulse >= LEAST_IMPULSE_S * self.trace.machine.weight_n();
+            let sticking = || BEYOND_STICKING * (self.by_chance)().brief;
+            return is_strong || (f64::MIN_POSITIVE..beyond).contains(&sticking());
         }
-        let (gain, least) = ((before.score - with.score) / last.kind.trial.caution, self.least(before.score));
-        let is_sure = last.kind.trial.brief || self.z(last, with) > LEAST_Z;
+        let needed = if gain > self.least(before.score) { LEAST_Z } else { SURE_Z };
+        let is_sure = self.is_momentary(last) || self.z(last, with) > needed;
         // What sticking mimics on clean robots too is in doubt however large it is.
         let is_plain = last.kind.trial.caution <= 1.0;
-        gain > least && is_sure && (is_plain && gain > DOUBT * least || gain > (self.by_chance)())
+        is_sure && (is_plain && beyond > DOUBT || beyond > (self.by_chance)().lasting)
     }
 
     /// Drops picks that are not far beyond what chance does and do not lower the error on rows that no fit has seen, and
@@ -87,12 +119,12 @@ impl Search<'_> {
             let mut others = self.picks.clone();
             let pick = others.remove(place);
             let (Some(with), Some(without)) = (self.fit(&self.picks), self.fit(&others)) else { return };
-            let gain = (without.score - with.score) / pick.kind.trial.caution;
+            let gain = without.score - with.score;
             let unseen = |picks: &[Candidate], fit: &Fit| {
                 let left = self.left_raw(picks, &fit.judged.coefficients);
                 self.channels.unseen(&left).iter().map(|v| v * v).sum::<f64>()
             };
-            let is_weak = gain < DOUBT * self.least(without.score)
+            let is_weak = gain < DOUBT * self.least_of(pick.kind, without.score)
                 && unseen(&self.picks, &with) >= unseen(&others, &without);
             let harms = held_out_error(self, &self.picks, &with) >= held_out_error(self, &others, &without);
             if !pick.kind.trial.brief && (is_weak || harms) {
@@ -136,11 +168,16 @@ impl Search<'_> {
         with.judged.z(first..with.members.len(), &lengths)
     }
 
-    /// The largest gain of anything that is tried beside nothing else, each by the evidence that it needs.
-    pub(in crate::refine::robot) fn largest(&self) -> f64 {
-        let Some(bare) = self.fit(&[]) else { return 0.0 };
-        let gains = self.ranked(&[], &bare).into_iter().filter(|(pick, _)| !pick.kind.trial.brief);
-        gains.map(|(pick, fit)| (bare.score - fit.score) / pick.kind.trial.caution).fold(0.0, f64::max)
+    /// The largest gain of anything that is tried beside nothing else, as a multiple of the least that it needs.
+    pub(in crate::refine::robot) fn largest(&self) -> Chance {
+        let mut largest = Chance::default();
+        let Some(bare) = self.fit(&[]) else { return largest };
+        for (pick, fit) in self.ranked(&[], &bare) {
+            let beyond = (bare.score - fit.score) / self.least_of(pick.kind, bare.score);
+            let own = if pick.kind.trial.brief { &mut largest.brief } else { &mut largest.lasting };
+            *own = own.max(beyond);
+        }
+        largest
     }
 
     /// Replaces picks where another does better, and drops those that others have made needless.
@@ -152,7 +189,7 @@ impl Search<'_> {
                 let mut others = self.picks.clone();
                 let removed = others.remove(place);
                 let Some(without) = self.fit(&others) else { return };
-                if without.score - now.score < self.least(now.score) {
+                if without.score - now.score < self.least_of(removed.kind, now.score) {
                     self.picks = others;
                     *now = without;
                     changed = true;
@@ -177,6 +214,33 @@ impl Search<'_> {
         }
     }
 
+    /// Puts a kind with fewer parameters in the place of a pick where it does as well.
+    pub(in crate::refine::robot) fn simplify(&mut self) {
+        for place in 0..self.picks.len() {
+            let mut others = self.picks.clone();
+            let pick = others.remove(place);
+            if let Some(simple) = self.simpler(&pick, &others) {
+                self.picks[place] = simple;
+            }
+        }
+    }
+
+    fn simpler(&self, pick: &Candidate, others: &[Candidate]) -> Option<Candidate> {
+        let with = |pick: &Candidate| {
+            let fit = self.fit(&[others, std::slice::from_ref(pick)].concat())?;
+            Some(fit.score + handicap(pick))
+        };
+        let (screen, price) = (Screen::new(self, others)?, with(pick)?);
+        let least = screen.gain(pick) - handicap(pick);
+        let fewer = self.library.iter().filter(|other| other.parameters() < pick.parameters());
+        fewer
+            .filter(|other| others.iter().all(|o| o.kind != other.kind) && screen.gain(other) > least)
+            .filter_map(|other| Some((with(other)?, other)))
+            .filter(|(own, _)| *own < price)
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+            .map(|(_, other)| other.clone())
+    }
+
     /// The candidate that lowers the score most, its shape refined.
     fn best(&self, picks: &[Candidate], now: &Fit) -> Option<(Candidate, Fit)> {
         Self::first_of(self.ranked(picks, now))
@@ -184,9 +248,6 @@ impl Search<'_> {
 
     fn first_of(ranked: Vec<(Candidate, Fit)>) -> Option<(Candidate, Fit)> {
         // Where others do as well, what needs less is preferred.
-        let handicap = |pick: &Candidate| {
-            HANDICAP[0] * pick.shape.len() as f64 + HANDICAP[1] * (pick.kind.trial.caution - 1.0)
-        };
         let price = |(pick, fit): &(Candidate, Fit)| fit.score + handicap(pick);
         ranked.into_iter().min_by(|a, b| price(a).total_cmp(&price(b)))
     }
@@ -194,21 +255,23 @@ impl Search<'_> {
     /// The most promising candidates, their shapes refined, with their fits beside the picks.
     pub(in crate::refine::robot) fn ranked(&self, picks: &[Candidate], now: &Fit) -> Vec<(Candidate, Fit)> {
         let Some(screen) = Screen::new(self, picks) else { return Vec::new() };
-        let mut list = self.short_list(&screen, picks, now);
+        let list = self.short_list(&screen, picks, now);
         let leader = list.first().map_or(0.0, |(gain, _)| *gain);
-        let refined = list
-            .iter_mut()
-            .filter(|(gain, candidate)| *gain > WORTH_REFINING * leader && candidate.is_flexible());
-        for (gain, candidate) in refined.take(REFINED) {
-            self.refine_shape(&screen, candidate, *gain);
-        }
-        let fitted = |(_, candidate): (f64, Candidate)| {
+        let promises = |(gain, candidate): &&(f64, Candidate)| {
+            *gain > WORTH_REFINING * leader && candidate.is_flexible()
+        };
+        let refined: Vec<&(f64, Candidate)> = list.iter().filter(promises).take(REFINED).collect();
+        let fitted = |listed: &(f64, Candidate)| {
+            let mut candidate = listed.1.clone();
+            if refined.iter().any(|refined| std::ptr::eq(*refined, listed)) {
+                self.refine_shape(&screen, &mut candidate, listed.0);
+            }
             let mut tried = picks.to_vec();
             tried.push(candidate);
             let fit = self.fit(&tried)?;
             Some((tried.pop()?, fit))
         };
-        list.into_iter().filter_map(fitted).collect()
+        parallel::map(&list, self.threads, fitted).into_iter().flatten().collect()
     }
 
     /// Candidates by what they would gain as they are; of one that is flexible only its best shape.

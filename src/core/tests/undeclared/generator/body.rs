@@ -91,7 +91,7 @@ pub(crate) const BODIES: [Body; 4] = [
 ];
 
 impl Body {
-    /// The same robot, every number off by up to `share` (friction ten times that).
+    /// The same robot, every number off by up to `share`, its height by half of that.
     pub(crate) fn jittered(mut self, share: f64, random: &mut Random) -> Self {
         let mut off = |value: &mut f64, share: f64| *value *= 1.0 + random.between(-share, share);
         off(&mut self.mass, share);
