@@ -37,7 +37,7 @@ pub(crate) fn with_ending<K: FileKind>(path: PathBuf, kind: K) -> PathBuf {
 /// Why a file was not written, and the mend.
 pub(crate) fn not_saved(path: &Path, error: &std::io::Error) -> String {
     format!(
-        "{} could not be saved: {error}; check the folder, its permissions and the space on the disk",
+        "{} could not be saved: {error}; check the folder, its permissions and the space on the disk.",
         path.display()
     )
 }

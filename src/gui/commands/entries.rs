@@ -352,6 +352,14 @@ fn run() -> Vec<Entry> {
             &[],
             |s| Ok(start_refine(s)),
         ),
+        entry(
+            menu,
+            "demo",
+            "Search the records of a demo robot",
+            "A simulated robot with something that its model does not have",
+            &[],
+            |_| Ok(Command::Refine(RefineCommand::Start(Question::Demo))),
+        ),
         entry(menu, "experiment", "Run or cancel the experiment", "Both controllers", &[], |s| {
             Ok(start_experiment(s))
         }),

@@ -49,7 +49,7 @@ pub(super) struct SecondAxis {
 impl SecondAxis {
     /// An axis that shows `range` where the first one shows `left`, with round values at the first one's `lines`.
     pub(super) fn new(label: String, color: Color32, range: [f64; 2], left: [f64; 2], lines: f64) -> Self {
-        let step = round_step((left[1] - left[0]) / lines);
+        let step = grid_step(left, lines);
         let count = ((left[1] - left[0]) / step - 1.0).max(1.5);
         let own_step = round_step((range[1] - range[0]) / count);
         let middle = |ends: [f64; 2], step: f64| ((0.5 * ends[0] + 0.5 * ends[1]) / step).round() * step;
@@ -144,19 +144,35 @@ fn round_step(rough: f64) -> f64 {
     [1.0, 2.0, 5.0].into_iter().map(|m| m * power).find(|step| *step >= rough).unwrap_or(10.0 * power)
 }
 
-/// Grid marks at round values (1, 2 or 5 times a power of ten), about `count` of them, none at the very
-/// edge, where its label would run into the next plot's.
+/// Fewer labelled lines than this tell no scale.
+const FEWEST_MARKS: usize = 2;
+
+/// Step between about `count` lines over a range; smaller where too few round values would lie inside.
+fn grid_step(range: [f64; 2], count: f64) -> f64 {
+    let rough = (range[1] - range[0]) / count;
+    let steps = [1.0, 0.5, 0.25, 0.1].map(|part| round_step(part * rough));
+    let enough = |step: &f64| inner_marks(range, *step).1 >= FEWEST_MARKS;
+    steps.into_iter().find(enough).unwrap_or(steps[0])
+}
+
+/// The first multiple of a step inside of a range, and how many there are. None is at the very edge, where its label
+/// would run into the next plot's.
+fn inner_marks([low, high]: [f64; 2], step: f64) -> (f64, usize) {
+    let edge = 0.035 * (high - low);
+    let first = ((low + edge) / step).ceil();
+    let last = ((high - edge) / step).floor();
+    (first, if last >= first { (last - first) as usize + 1 } else { 0 })
+}
+
+/// Grid marks at round values (1, 2 or 5 times a power of ten), about `count` of them.
 fn round_marks(input: GridInput, count: f64) -> Vec<GridMark> {
     let (low, high) = input.bounds;
     let rough = (high - low) / count;
     if !(rough.is_finite() && rough > 0.0) {
         return Vec::new();
     }
-    let step_size = round_step(rough);
-    let edge = 0.035 * (high - low);
-    let first = ((low + edge) / step_size).ceil();
-    let last = ((high - edge) / step_size).floor();
-    let number = if last >= first { (last - first) as usize + 1 } else { 0 };
+    let step_size = grid_step([low, high], count);
+    let (first, number) = inner_marks([low, high], step_size);
     (0..number).map(|index| GridMark { value: (first + index as f64) * step_size, step_size }).collect()
 }
 
@@ -188,6 +204,7 @@ mod tests {
         };
         assert_eq!(marks((-0.013, 0.029)), ["0.00", "0.02"]);
         assert_eq!(marks((-0.2, 0.2)), ["−0.1", "0.0", "0.1"]);
+        assert_eq!(marks((-0.43, 0.41)), ["−0.4", "−0.2", "0.0", "0.2"], "one alone would tell no scale");
         assert!(marks((1.0, 1.0)).is_empty());
         assert!(marks((f64::NEG_INFINITY, 1.0)).is_empty());
     }
