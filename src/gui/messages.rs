@@ -1,15 +1,21 @@
 //! Every message since the start: the newest is in the status line, all are on the *Log* page.
 
+use std::cell::Cell;
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-use egui::{CentralPanel, Frame, Margin, RichText, ScrollArea, TextEdit, Ui};
+use egui::{
+    Align, CentralPanel, Color32, Frame, Layout, Margin, Rect, RichText, ScrollArea, TextEdit, TextStyle, Ui,
+    UiBuilder, vec2,
+};
 
 use crate::theme::palette;
 use crate::widgets::hint_ui;
 
 /// The oldest go first.
 const LONGEST: usize = 2000;
+/// Room for the time of a message.
+const TIME_WIDTH: f32 = 96.0;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Severity {
@@ -34,9 +40,31 @@ pub(crate) struct Message {
     pub(crate) severity: Severity,
     pub(crate) text: String,
     pub(crate) times: usize,
+    /// Width that it was laid out in last, and the height that it took.
+    laid_out: Cell<Option<(f32, f32)>>,
 }
 
 impl Message {
+    fn text(&self) -> String {
+        match self.times {
+            1 => self.text.clone(),
+            times => format!("{} ({times} times)", self.text),
+        }
+    }
+
+    /// How high it is in `width`; laid out only once for it.
+    fn height(&self, ui: &Ui, width: f32) -> f32 {
+        if let Some((known, height)) = self.laid_out.get()
+            && known == width
+        {
+            return height;
+        }
+        let font = TextStyle::Body.resolve(ui.style());
+        let height = ui.painter().layout(self.text(), font, Color32::PLACEHOLDER, width).size().y;
+        self.laid_out.set(Some((width, height)));
+        height
+    }
+
     fn line(&self) -> String {
         let times = if self.times > 1 { format!(" ({} times)", self.times) } else { String::new() };
         format!("{:9.3} s  {:5}  {}{times}", self.time.as_secs_f64(), self.severity.word(), self.text)
@@ -64,12 +92,14 @@ impl Messages {
             Some(last) if last.text == text && last.severity == severity => {
                 last.time = time;
                 last.times += 1;
+                last.laid_out.take();
             }
             _ => {
                 if self.all.len() == LONGEST {
                     self.all.pop_front();
                 }
-                self.all.push_back(Message { time, severity, text, times: 1 });
+                let laid_out = Cell::new(None);
+                self.all.push_back(Message { time, severity, text, times: 1, laid_out });
             }
         }
     }
@@ -122,23 +152,49 @@ impl Messages {
             hint_ui(ui, "No message.");
             return;
         }
-        let color = palette(ui.visuals()).error;
-        ScrollArea::vertical().auto_shrink(false).stick_to_bottom(true).show(ui, |ui| {
-            for message in shown {
-                ui.horizontal_top(|ui| {
-                    let time = format!("{:9.3} s", message.time.as_secs_f64());
-                    ui.label(RichText::new(time).monospace().weak()).on_hover_text("Time since the start");
-                    let text = match (message.severity, message.times) {
-                        (_, 1) => message.text.clone(),
-                        (_, times) => format!("{} ({times} times)", message.text),
-                    };
-                    let text = RichText::new(text);
-                    let text = if message.severity == Severity::Error { text.color(color) } else { text };
-                    ui.add(egui::Label::new(text).wrap().selectable(true));
-                });
+        let space = ui.spacing().item_spacing;
+        // The scroll bar's room is not the text's.
+        let width =
+            (ui.available_width() - TIME_WIDTH - space.x - 2.0 * ui.spacing().scroll.bar_width).max(80.0);
+        let mut bottom = 0.0;
+        let bottoms: Vec<f32> = shown
+            .iter()
+            .map(|message| {
+                bottom += message.height(ui, width) + space.y;
+                bottom
+            })
+            .collect();
+        // Only what is in view is drawn.
+        ScrollArea::vertical().auto_shrink(false).stick_to_bottom(true).show_viewport(ui, |ui, viewport| {
+            ui.set_height(bottom);
+            let corner = ui.min_rect().left_top();
+            let first = bottoms.partition_point(|bottom| *bottom < viewport.top());
+            for index in first..shown.len() {
+                let top = if index == 0 { 0.0 } else { bottoms[index - 1] };
+                if top > viewport.bottom() {
+                    break;
+                }
+                let size = vec2(TIME_WIDTH + space.x + width, bottoms[index] - top);
+                let rect = Rect::from_min_size(corner + vec2(0.0, top), size);
+                let place = UiBuilder::new().max_rect(rect).layout(Layout::left_to_right(Align::Min));
+                ui.scope_builder(place, |ui| row_ui(shown[index], ui));
             }
         });
     }
+}
+
+fn row_ui(message: &Message, ui: &mut Ui) {
+    let time = RichText::new(format!("{:9.3} s", message.time.as_secs_f64())).monospace().weak();
+    ui.allocate_ui(vec2(TIME_WIDTH, 0.0), |ui| {
+        ui.set_width(TIME_WIDTH);
+        ui.label(time).on_hover_text("Time since the start");
+    });
+    let text = RichText::new(message.text());
+    let text = match message.severity {
+        Severity::Error => text.color(palette(ui.visuals()).error),
+        Severity::Note => text,
+    };
+    ui.add(egui::Label::new(text).wrap().selectable(true));
 }
 
 #[cfg(test)]

@@ -217,7 +217,7 @@ impl App {
     fn leave_ui(&self, ui: &mut Ui) -> Reply {
         ui.heading("Save the model?");
         ui.label(format!("“{}” has changes that are in no file.", self.session.name));
-        changes_ui(&self.saved.model().changes_to(&self.session.model()), ui);
+        changes_ui(&self.saved.model().changes_to(&self.session.model()), ["saved", "now"], ui);
         answers_ui(
             ui,
             [
@@ -247,7 +247,7 @@ impl App {
             losses.push(format!("{} of the model change.", listed(changes.len(), "value")));
         }
         ui.label(format!("{} Undo brings all of now back.", losses.join(" ")));
-        changes_ui(changes, ui);
+        changes_ui(changes, ["now", "then"], ui);
         answers_ui(
             ui,
             [
@@ -336,7 +336,7 @@ fn preset_ui(number: usize, name: &str, changes: &[Change], ui: &mut Ui) -> Repl
         ui.label("It is what the window shows already.");
     } else {
         ui.label(format!("{} values change. Undo brings those of now back.", changes.len()));
-        changes_ui(changes, ui);
+        changes_ui(changes, ["now", "then"], ui);
     }
     answers_ui(
         ui,
@@ -361,11 +361,11 @@ fn overwrite_ui(path: &Path, ui: &mut Ui) -> Reply {
 }
 
 /// Old and new values, key by key.
-fn changes_ui(changes: &[Change], ui: &mut Ui) {
+fn changes_ui(changes: &[Change], heads: [&str; 2], ui: &mut Ui) {
     let value = |value: &Option<String>| value.clone().unwrap_or_else(|| "–".to_owned());
     ScrollArea::vertical().max_height(LONGEST_TABLE).show(ui, |ui| {
         Grid::new("changes").num_columns(3).striped(true).spacing([14.0, 3.0]).show(ui, |ui| {
-            for head in ["value", "now", "then"] {
+            for head in ["value", heads[0], heads[1]] {
                 hint_ui(ui, head);
             }
             ui.end_row();
@@ -386,7 +386,7 @@ fn restore_ui(document: &Document, whole: bool, ui: &mut Ui) -> Reply {
         document_name(document)
     ));
     if let (Some(saved), Some(model)) = (&document.saved_model, &document.model) {
-        changes_ui(&saved.changes_to(model), ui);
+        changes_ui(&saved.changes_to(model), ["saved", "kept"], ui);
     }
     if !whole {
         warning_ui(ui, "Not all of it could be read: the Log page says what.");

@@ -59,22 +59,24 @@ fn entry_ui(entry: &Entry, situation: &Situation<'_>, commands: &Commands, ui: &
 
 /// The list of keys.
 pub(crate) fn keys_ui(ui: &mut Ui) {
-    ScrollArea::vertical().max_height(520.0).show(ui, |ui| {
-        Grid::new("keys").num_columns(2).spacing([16.0, 4.0]).show(ui, |ui| {
-            let mut row = |keys: &str, meaning: &str| {
-                ui.label(RichText::new(keys).monospace());
-                ui.label(meaning);
-                ui.end_row();
-            };
+    let room = (ui.ctx().content_rect().height() - 90.0).max(120.0);
+    ScrollArea::vertical().max_height(room).min_scrolled_height(room).show(ui, |ui| {
+        Grid::new("keys").num_columns(2).spacing([16.0, 2.0]).show(ui, |ui| {
             for (keys, meaning) in GESTURES {
-                row(keys, meaning);
+                ui.label(RichText::new(*keys).monospace());
+                ui.label(*meaning);
+                ui.end_row();
             }
         });
+        ui.separator();
         let with_keys: Vec<_> = ALL.iter().filter(|entry| !entry.keys.is_empty()).collect();
-        Grid::new("command keys").num_columns(2).spacing([16.0, 4.0]).show(ui, |ui| {
-            for entry in with_keys {
-                ui.label(RichText::new(entry.keys_text(ui.ctx())).monospace());
-                ui.label(&*entry.name).on_hover_text(&*entry.help);
+        let (left, right) = with_keys.split_at(with_keys.len().div_ceil(2));
+        Grid::new("command keys").num_columns(4).spacing([16.0, 2.0]).show(ui, |ui| {
+            for row in 0..left.len() {
+                for entry in left.get(row).into_iter().chain(right.get(row)) {
+                    ui.label(RichText::new(entry.keys_text(ui.ctx())).monospace());
+                    ui.label(&*entry.name).on_hover_text(&*entry.help);
+                }
                 ui.end_row();
             }
         });

@@ -203,8 +203,22 @@ pub(crate) fn words(key: &str) -> String {
         ("lqr.r_diagonal[1]", "left torque weight"),
         ("lqr.r_diagonal[2]", "right torque weight"),
     ];
-    let known = WEIGHTS.iter().find(|(known, _)| *known == key);
-    known.map_or_else(|| plain_words(key), |(_, words)| (*words).to_owned())
+    let known = WEIGHTS.iter().find(|(known, _)| *known == key).map(|(_, words)| (*words).to_owned());
+    known.or_else(|| entry_words(key)).unwrap_or_else(|| plain_words(key))
+}
+
+/// An entry of a full weight matrix, `lqr.q[1][3]`.
+fn entry_words(key: &str) -> Option<String> {
+    const Q: &[&str] = &["displacement", "velocity", "pitch", "pitch rate"];
+    const R: &[&str] = &["left torque", "right torque"];
+    let (names, place) = match key.strip_prefix("lqr.q[") {
+        Some(place) => (Q, place),
+        None => (R, key.strip_prefix("lqr.r[")?),
+    };
+    let (row, column) = place.strip_suffix(']')?.split_once("][")?;
+    let name = |number: &str| names.get(number.parse::<usize>().ok()?.checked_sub(1)?);
+    let (row, column) = (name(row)?, name(column)?);
+    Some(if row == column { format!("{row} weight") } else { format!("{row} with {column} weight") })
 }
 
 /// A key without a name of its own: its table, its words, and its unit in brackets.
@@ -290,6 +304,10 @@ mod tests {
             ("friction.left.viscous_nm_s_rad", "left friction viscous [N m s/rad]"),
             ("limits.torque_nm", "limits torque [N m]"),
             ("compensation.ratio", "compensation ratio"),
+            ("lqr.q[1][1]", "displacement weight"),
+            ("lqr.q[1][3]", "displacement with pitch weight"),
+            ("lqr.r[2][1]", "right torque with left torque weight"),
+            ("lqr.q[9][1]", "lqr q[9][1]"),
             ("name", "name"),
         ] {
             assert_eq!(words(key), words_of_it);

@@ -10,8 +10,13 @@ use crate::command::Command;
 use crate::context::ViewContext;
 use crate::widgets::{hint_ui, mono, section_ui};
 
-/// Most rows drawn; the filter finds the others.
-const MOST_ROWS: usize = 300;
+/// Height of a row, with the room below it.
+const ROW_HEIGHT: f32 = 24.0;
+const COLUMNS: [&str; 10] =
+    ["show", "run", "UTC", "kind", "what", "seed", "Q | R", "sources", "result", "note"];
+/// Place of the result among the columns.
+const RESULT: usize = 8;
+const SPACING: f32 = 12.0;
 const NOTE_WIDTH: f32 = 150.0;
 /// Least and greatest width of a result.
 const RESULT_WIDTH: [f32; 2] = [160.0, 620.0];
@@ -22,8 +27,8 @@ pub(super) struct RunTable {
     filter: String,
     /// A note that is being typed.
     note: Option<(u64, String)>,
-    /// Width of all columns but the result, when they were drawn last.
-    others_width: f32,
+    /// Largest width that each column has had, so that they stay where they are when other rows come into view.
+    widths: [f32; COLUMNS.len()],
 }
 
 impl RunTable {
@@ -41,26 +46,43 @@ impl RunTable {
         if found.is_empty() {
             hint_ui(ui, "No row has these words in it.");
         }
-        let result_width = (ui.available_width() - self.others_width).clamp(RESULT_WIDTH[0], RESULT_WIDTH[1]);
-        ScrollArea::both().id_salt("runs").auto_shrink(false).show(ui, |ui| {
-            let grid =
-                Grid::new("run rows").num_columns(10).striped(true).spacing([12.0, 3.0]).show(ui, |ui| {
-                    for head in
-                        ["show", "run", "UTC", "kind", "what", "seed", "Q | R", "sources", "result", "note"]
-                    {
-                        hint_ui(ui, head);
+        let others: f32 = self.widths.iter().map(|width| width + SPACING).sum::<f32>() - self.widths[RESULT];
+        let result = (ui.available_width() - others).clamp(RESULT_WIDTH[0], RESULT_WIDTH[1]);
+        self.widths[RESULT] = result;
+        // The heads are the first row. Only what is in view is drawn.
+        let rows = ScrollArea::both().id_salt("runs").auto_shrink(false);
+        rows.show_rows(ui, ROW_HEIGHT - ui.spacing().item_spacing.y, found.len() + 1, |ui, range| {
+            let grid = Grid::new("run rows").num_columns(COLUMNS.len()).striped(true);
+            let grid = grid.spacing([SPACING, 0.0]).min_row_height(ROW_HEIGHT).start_row(range.start);
+            grid.show(ui, |ui| {
+                for row in range {
+                    match row.checked_sub(1).and_then(|index| found.get(index)) {
+                        Some(run) => self.row_ui(context, run, ticked, ui),
+                        None => self.heads_ui(ui),
                     }
                     ui.end_row();
-                    for run in found.iter().take(MOST_ROWS) {
-                        self.row_ui(context, run, ticked, result_width, ui);
-                        ui.end_row();
-                    }
-                });
-            self.others_width = (grid.response.rect.width() - result_width).max(0.0) + 16.0;
-            if found.len() > MOST_ROWS {
-                hint_ui(ui, format!("and {} older ones: the filter finds them", found.len() - MOST_ROWS));
-            }
+                }
+            });
         });
+    }
+
+    fn heads_ui(&mut self, ui: &mut Ui) {
+        for (column, head) in COLUMNS.into_iter().enumerate() {
+            self.cell_ui(column, ui, |ui| ui.label(RichText::new(head).small().weak()));
+        }
+    }
+
+    /// A cell as wide as its column has been.
+    fn cell_ui<R>(&mut self, column: usize, ui: &mut Ui, content: impl FnOnce(&mut Ui) -> R) -> R {
+        let width = &mut self.widths[column];
+        let cell = ui.horizontal(|ui| {
+            ui.set_min_width(*width);
+            content(ui)
+        });
+        if column != RESULT {
+            *width = width.max(cell.response.rect.width());
+        }
+        cell.inner
     }
 
     /// From the right to the left.
@@ -98,39 +120,33 @@ impl RunTable {
     }
 
     fn finds(&self, run: &Run) -> bool {
+        if self.filter.trim().is_empty() {
+            return true;
+        }
         let text = format!("{} {} {} {} {}", run.number, run.kind.name(), run.title, run.result, run.note);
         let text = text.to_lowercase();
         self.filter.to_lowercase().split_whitespace().all(|word| text.contains(word))
     }
 
-    fn row_ui(
-        &mut self,
-        context: &ViewContext<'_>,
-        run: &Run,
-        ticked: &mut BTreeSet<u64>,
-        result_width: f32,
-        ui: &mut Ui,
-    ) {
-        let number = run.number;
-        ui.horizontal(|ui| tick_ui(context, run, ticked, ui));
-        ui.horizontal(|ui| {
-            ui.label(mono(number.to_string()).strong());
-            let delete =
-                ui.add(Button::new("×").small().frame(false)).accessible_name(format!("delete run {number}"));
-            if delete.on_hover_text("Take this row out; Undo delete brings it back").clicked() {
-                context.commands.send(Command::Runs(RunsCommand::Delete(vec![number])));
-            }
+    fn row_ui(&mut self, context: &ViewContext<'_>, run: &Run, ticked: &mut BTreeSet<u64>, ui: &mut Ui) {
+        let result = self.widths[RESULT];
+        let hash = run.sources.get(..8).unwrap_or(&run.sources);
+        self.cell_ui(0, ui, |ui| tick_ui(context, run, ticked, ui));
+        self.cell_ui(1, ui, |ui| number_ui(context, run.number, ui));
+        self.cell_ui(2, ui, |ui| {
+            ui.label(mono(clock(run.unix_s))).on_hover_text(format!("{} seconds since 1970", run.unix_s))
         });
-        ui.label(mono(clock(run.unix_s))).on_hover_text(format!("{} seconds since 1970", run.unix_s));
-        ui.label(run.kind.name());
-        title_ui(context, run, ui);
-        ui.label(mono(run.seed.map_or("–".to_owned(), |seed| seed.to_string())));
-        ui.label(mono(run.weights()).small());
-        ui.label(mono(run.sources.get(..8).unwrap_or(&run.sources)).small().weak())
-            .on_hover_text(format!("{}: hash of the model and of the logs' columns", run.sources));
-        ui.allocate_ui(egui::vec2(result_width, 18.0), |ui| {
-            ui.set_min_width(result_width);
-            ui.add(Label::new(RichText::new(&run.result).small()).truncate()).on_hover_text(&run.result);
+        self.cell_ui(3, ui, |ui| ui.label(run.kind.name()));
+        self.cell_ui(4, ui, |ui| title_ui(context, run, ui));
+        self.cell_ui(5, ui, |ui| ui.label(mono(run.seed.map_or("–".to_owned(), |seed| seed.to_string()))));
+        self.cell_ui(6, ui, |ui| ui.label(mono(run.weights()).small()));
+        self.cell_ui(7, ui, |ui| {
+            ui.label(mono(hash).small().weak())
+                .on_hover_text(format!("{}: hash of the model and of the logs' columns", run.sources))
+        });
+        self.cell_ui(RESULT, ui, |ui| {
+            ui.set_max_width(result);
+            ui.add(Label::new(RichText::new(&run.result).small()).truncate()).on_hover_text(&run.result)
         });
         self.note_ui(context, run, ui);
     }
@@ -151,6 +167,15 @@ impl RunTable {
         {
             context.commands.send(Command::Runs(RunsCommand::SetNote(number, text)));
         }
+    }
+}
+
+fn number_ui(context: &ViewContext<'_>, number: u64, ui: &mut Ui) {
+    ui.label(mono(number.to_string()).strong());
+    let delete = ui.add(Button::new("×").small().frame(false));
+    let delete = delete.accessible_name(format!("delete run {number}"));
+    if delete.on_hover_text("Take this row out; Undo delete brings it back").clicked() {
+        context.commands.send(Command::Runs(RunsCommand::Delete(vec![number])));
     }
 }
 

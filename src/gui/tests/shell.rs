@@ -106,6 +106,29 @@ fn messages_are_kept_filtered_and_copied() {
 }
 
 #[test]
+fn of_a_long_list_of_messages_what_is_in_view_is_drawn_with_the_newest() {
+    let mut window = open(options(Tab::Log), SIZE);
+    for number in 0..120 {
+        let key = if number % 2 == 0 { Key::Enter } else { Key::Z };
+        window.key_press_modifiers(Modifiers::COMMAND, key);
+        window.step();
+    }
+    window.run_steps(3);
+    window.get_by_label("121 of 121 messages");
+    let drawn = window.get_all_by_label_contains("starts nothing").count();
+    assert!((8..40).contains(&drawn), "{drawn} of 60");
+    let newest = window.get_all_by_label("Undo: there is nothing to undo.").map(|node| node.rect().bottom());
+    let lowest = newest.fold(0.0, f32::max);
+    assert!(lowest > SIZE.y - 80.0, "the list ends at {lowest}");
+    window.get_by_label("message filter").click();
+    window.step();
+    window.event(Event::Text("loaded".to_owned()));
+    window.run_steps(3);
+    window.get_by_label("1 of 121 messages");
+    assert_eq!(window.get_all_by_label_contains("is loaded.").count(), 1);
+}
+
+#[test]
 fn theme_and_size_are_commands_too() {
     let mut window = open(options(Tab::Tune), SIZE);
     let dark = window.ctx.global_style().visuals.dark_mode;
