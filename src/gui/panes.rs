@@ -13,6 +13,7 @@ pub(crate) struct Pane<K> {
     name: &'static str,
     place: Place,
     width: f32,
+    wanted: bool,
 }
 
 enum Place {
@@ -24,17 +25,22 @@ enum Place {
 impl<K> Pane<K> {
     /// At the left, `width` wide until it is dragged within `widths`; scrolls.
     pub(crate) fn left(key: K, name: &'static str, width: f32, widths: RangeInclusive<f32>) -> Self {
-        Self { key, name, place: Place::Left(widths), width }
+        Self { key, name, place: Place::Left(widths), width, wanted: false }
     }
 
     /// What is left between the others, and at least `width`.
     pub(crate) fn middle(key: K, name: &'static str, width: f32) -> Self {
-        Self { key, name, place: Place::Middle, width }
+        Self { key, name, place: Place::Middle, width, wanted: false }
     }
 
     /// As [`Self::left`], at the right.
     pub(crate) fn right(key: K, name: &'static str, width: f32, widths: RangeInclusive<f32>) -> Self {
-        Self { key, name, place: Place::Right(widths), width }
+        Self { key, name, place: Place::Right(widths), width, wanted: false }
+    }
+
+    /// Brought to the front where `wanted`: something in it is about to take the keyboard.
+    pub(crate) fn in_front(self, wanted: bool) -> Self {
+        Self { wanted, ..self }
     }
 }
 
@@ -51,6 +57,10 @@ pub(crate) fn panes_ui<K: Copy>(
     let id = Id::unique(("pane in front", page));
     let middle = panes.iter().position(|pane| matches!(pane.place, Place::Middle)).unwrap_or(0);
     let mut front = ui.data(|data| data.get_temp::<usize>(id)).unwrap_or(middle).min(panes.len().max(1) - 1);
+    if let Some(wanted) = panes.iter().position(|pane| pane.wanted) {
+        front = wanted;
+        ui.data_mut(|data| data.insert_temp(id, front));
+    }
     let widths: Vec<f32> = panes.iter().map(|pane| pane.width).collect();
     let room = ui.available_width();
     if in_view(&widths, front, room).contains(&false) {

@@ -9,7 +9,7 @@ use super::weights::Weights;
 use crate::robot::LinearModel;
 
 /// In how many parts the way is walked: where a way of few parts is lost, one of more is tried.
-const PARTS: [usize; 4] = [1, 3, 9, 27];
+const PARTS: [usize; 3] = [1, 4, 12];
 const NEWTON_STEPS: usize = 8;
 /// Distance that counts as reached, relative to the pole's size.
 const REACHED: f64 = 1e-3;
@@ -26,7 +26,8 @@ const REAL: f64 = 1e-6;
 /// How far weights can take a pole.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placement {
-    /// Those that take it there, or as far as the way goes.
+    /// Those that take it there, or as far along the way as there are any; to three digits, as people write weights,
+    /// where the loop is as stable with these.
     pub weights: Weights,
     /// Where the pole is with them, 1/s.
     pub pole: Complex<f64>,
@@ -35,7 +36,7 @@ pub struct Placement {
 }
 
 /// Weights with R and the correlations of `start` whose loop, as it runs, has its pole `from` at `to`, 1/s; a real
-/// pole stays real, and no pole passes the imaginary axis that was left of it. Of all that do, those next to `start` in the logarithms of Q's diagonal, about: Newton's method
+/// pole stays real. No pole comes to lie further right than the rightmost of `start`, or than the imaginary axis. Of all that do, those next to `start` in the logarithms of Q's diagonal, about: Newton's method
 /// along the line from one to the other. Where the line leaves what diagonals of Q from 1e-6 to 1e8 can do, they are
 /// those of its last place.
 pub fn weights_for_pole(
@@ -53,13 +54,11 @@ pub fn weights_for_pole(
     let mut farthest = (logarithms, from);
     for parts in PARTS {
         match search.walk(logarithms, from, to, parts) {
-            Ok((found, pole)) => {
-                return Placement { weights: search.weights(&found), pole, is_reached: true };
-            }
+            Ok((found, pole)) => return search.placement(&found, pole, true),
             Err(lost) => farthest = lost,
         }
     }
-    Placement { weights: search.weights(&farthest.0), pole: farthest.1, is_reached: false }
+    search.placement(&farthest.0, farthest.1, false)
 }
 
 /// Logarithms of Q's diagonal, and where a pole is with them.
@@ -84,6 +83,16 @@ impl Search<'_> {
             weights.set_state_weight(state, logarithms[state].exp());
         }
         weights
+    }
+
+    fn placement(&self, logarithms: &Vector4<f64>, pole: Complex<f64>, is_reached: bool) -> Placement {
+        let rounded = logarithms.map(|value| {
+            let weight = value.exp();
+            format!("{weight:.2e}").parse().unwrap_or(weight).ln()
+        });
+        let of_rounded = self.pole(&rounded, pole);
+        let (logarithms, pole) = of_rounded.map_or((*logarithms, pole), |pole| (rounded, pole));
+        Placement { weights: self.weights(&logarithms), pole, is_reached }
     }
 
     fn poles(&self, logarithms: &Vector4<f64>) -> Option<Vec<SampledPole>> {

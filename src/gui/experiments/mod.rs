@@ -236,7 +236,8 @@ impl ExperimentsTab {
     pub(crate) fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
         let arrows = !self.plots.stack.has_cursors();
         self.playback.keys(ui, arrows, &mut self.marks);
-        let form = Pane::left(Part::Form, "Experiment", 260.0, 240.0..=420.0);
+        let form =
+            Pane::left(Part::Form, "Experiment", 260.0, 240.0..=420.0).in_front(self.saver.form.focus_path);
         let Some(comparison) = self.runs.comparison().cloned() else {
             let panes = [form, Pane::middle(Part::Plots, "Plots", 300.0)];
             panes_ui(ui, "no experiment", &panes, |part, ui| match part {

@@ -143,7 +143,7 @@ impl FrictionTab {
 
     pub(crate) fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
         let panes = [
-            Pane::left(Part::Log, "Log and fit", 330.0, 280.0..=480.0),
+            Pane::left(Part::Log, "Log and fit", 330.0, 280.0..=480.0).in_front(self.source.focus_path),
             Pane::middle(Part::Plots, "Plots", 380.0),
             Pane::right(Part::Result, "Result", 300.0, 250.0..=460.0),
         ];

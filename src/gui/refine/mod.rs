@@ -332,7 +332,8 @@ impl RefineTab {
         let states = self.states(context.session);
         Panel::top("steps of the loop").frame(side).show(ui, |ui| strip::ui(&mut self.step, &states, ui));
         let panes = [
-            Pane::left(Part::Sources, "Logs and search", 330.0, 280.0..=480.0),
+            Pane::left(Part::Sources, "Logs and search", 330.0, 280.0..=480.0)
+                .in_front(self.sources.focus_path || self.saver.focus_path),
             Pane::middle(Part::Step, "Step of the loop", 380.0),
         ];
         panes_ui(ui, "refine", &panes, |part, ui| match part {

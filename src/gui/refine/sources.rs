@@ -65,7 +65,7 @@ impl PartialEq for Input {
 pub(super) struct Sources {
     path: String,
     column_map: ColumnMapForm,
-    focus_path: bool,
+    pub(super) focus_path: bool,
     pub(super) dialog_problem: Option<String>,
     pub(super) list: Vec<Source>,
     next_id: u64,

@@ -301,7 +301,7 @@ fn empty_ui(context: &ViewContext<'_>, ui: &mut Ui) {
             }
         } else {
             ui.heading("Not connected");
-            hint_ui(ui, "Fill in the form at the left and connect. Motors, IMU, bus and raw frames appear here, the plots on the Tune tab.");
+            hint_ui(ui, "Fill in the form and connect. Motors, IMU, bus and raw frames appear here, the plots on the Tune tab.");
         }
     });
 }

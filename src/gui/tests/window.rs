@@ -618,3 +618,34 @@ fn margins_are_told_for_the_delay_that_the_model_has() {
     assert!(window.query_by_label("gain up").is_none());
     assert!(window.query_by_label_contains("Unstable as it runs (1 kHz, 60 ms of delay").is_some());
 }
+
+#[test]
+fn a_dragged_pole_takes_the_weights_with_it_in_one_step() {
+    let mut window = open(options(Tab::Tune), SIZE);
+    let weights = |window: &Window| state(window)["q_diagonal"].clone();
+    let before = weights(&window);
+    let plane = window.get_by_label("plane of poles").rect();
+    // Where the poles are, the plane alone knows: the pointer looks for one, a reach at a time.
+    let places = (0..12).flat_map(|row| (0..10).map(move |column| (row, column)));
+    let moved = places.into_iter().any(|(row, column)| {
+        let from = plane.min + egui::vec2(5.0 + 15.0 * column as f32, 5.0 + 12.0 * row as f32);
+        window.hover_at(from);
+        window.step();
+        window.drag_at(from);
+        window.step();
+        for way in [3.0, 6.0, 9.0] {
+            window.hover_at(from - egui::vec2(way, 0.0));
+            window.run_steps(2);
+        }
+        window.drop_at(from - egui::vec2(9.0, 0.0));
+        window.run_steps(3);
+        weights(&window) != before
+    });
+    assert!(moved, "no pole was found in {plane:?}");
+    let after = state(&window);
+    assert_eq!(after["undo"], serde_json::json!(["weights"]), "one drag is one step");
+    assert_eq!(after["tune_tab"]["margins"]["stable"], true);
+    window.key_press_modifiers(egui::Modifiers::COMMAND, egui::Key::Z);
+    window.run_steps(3);
+    assert_eq!(weights(&window), before);
+}

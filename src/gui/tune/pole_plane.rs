@@ -3,6 +3,7 @@
 use egui::{Color32, Pos2, Response, Stroke, Ui, Vec2};
 use egui_plot::{Line, LineStyle, MarkerShape, PlotBounds, PlotPoints, PlotTransform, PlotUi, Points, Text};
 use flqr_core::lqr::{SampledPole, Weights, weights_for_pole};
+use flqr_core::robot::RobotParameters;
 use nalgebra::Complex;
 
 use super::margins::complex;
@@ -39,7 +40,10 @@ enum Plane {
 struct Drag {
     /// Weights and place of the pole when it was taken.
     start: Weights,
+    robot: RobotParameters,
     from: Complex<f64>,
+    /// Where the pointer was last, 1/s.
+    at: Option<Complex<f64>>,
     /// The view, which rests until the pole is let go.
     bounds: PlotBounds,
     /// How near it comes, while no weights take it to the pointer.
@@ -85,6 +89,10 @@ impl PolePlane {
                 PlotBounds::from_min_max([-half, -1.15], [half, 1.15])
             }
         };
+        // What ended out of sight of this plot, or was about another robot, is no drag.
+        let held = ui.input(|input| input.pointer.any_down() || input.pointer.any_released());
+        let robot = context.designer.in_force.map(|designed| designed.parameters);
+        self.drag = self.drag.take().filter(|drag| held && Some(drag.robot) == robot);
         let bounds = self.drag.as_ref().map_or(bounds, |drag| drag.bounds);
         let plot = quiet_plot(ui, size, x_label, y_label).show_grid(false);
         let shown = plot.show(ui, |plot_ui| {
@@ -105,6 +113,7 @@ impl PolePlane {
         let nearest = nearest.map(|(name, pole)| (name, *pole));
         self.drag_ui(context, now, &shown.response, &shown.transform);
         let refused = self.drag.as_ref().and_then(|drag| drag.refused);
+        shown.response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "plane of poles"));
         shown.response.on_hover_ui_at_pointer(|ui| {
             if let Some(refused) = refused {
                 warning_ui(ui, refused_text(refused));
@@ -136,7 +145,15 @@ impl PolePlane {
             let taken = self.nearest(transform, plants, pressed);
             let bounds = *transform.bounds();
             let start = context.session.weights();
-            self.drag = taken.map(|(_, pole)| Drag { start, from: pole.s, bounds, refused: None });
+            let robot = context.designer.in_force.map(|designed| designed.parameters);
+            self.drag = taken.zip(robot).map(|((_, pole), robot)| Drag {
+                start,
+                robot,
+                from: pole.s,
+                at: None,
+                bounds,
+                refused: None,
+            });
         }
         if let (Some(pointer), true) = (response.interact_pointer_pos(), response.dragged()) {
             let at = transform.value_from_position(pointer);
@@ -153,15 +170,14 @@ impl PolePlane {
         let (Some(drag), Some(designed)) = (&mut self.drag, context.designer.in_force) else { return };
         // A pole stays on its side of the real axis, where its other half is its mirror image.
         let at = Complex::new(at.re, if drag.from.im < 0.0 { at.im.min(0.0) } else { at.im.max(0.0) });
+        if drag.at.replace(at) == Some(at) {
+            return;
+        }
         let model = designed.parameters.linear_model();
         let placed = weights_for_pole(&model, &designed.timing, &drag.start, drag.from, at);
         drag.refused = (!placed.is_reached).then_some(placed.pole);
-        let mut weights = placed.weights;
-        for state in 0..4 {
-            weights.set_state_weight(state, rounded(weights.q[(state, state)]));
-        }
-        if weights != context.session.weights() {
-            context.commands.send(Command::SetWeights(weights));
+        if placed.weights != context.session.weights() {
+            context.commands.send(Command::SetWeights(placed.weights));
         }
     }
 
@@ -202,12 +218,10 @@ impl PolePlane {
 }
 
 fn refused_text(nearest: Complex<f64>) -> String {
-    format!("No weights put the pole there: it comes as near as {} 1/s.", complex(nearest.re, nearest.im))
-}
-
-/// To three digits, as people write weights.
-fn rounded(weight: f64) -> f64 {
-    format!("{weight:.2e}").parse().unwrap_or(weight)
+    format!(
+        "No weights put the pole there: on the way there it comes to {} 1/s.",
+        complex(nearest.re, nearest.im)
+    )
 }
 
 fn told(name: &str, pole: &SampledPole, named: bool) -> String {
