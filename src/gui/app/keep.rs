@@ -216,6 +216,7 @@ impl App {
             self.ledgers.push(runs.clone());
             self.show_ledger(self.ledgers.len() - 1);
         }
+        self.commands.send(Command::Refine(RefineCommand::Clear));
         for (path, held_out) in document.refine_logs.iter().flatten().cloned() {
             self.commands.send(Command::Refine(RefineCommand::Load { path, held_out }));
         }

@@ -15,6 +15,8 @@ pub(crate) enum RefineCommand {
         path: PathBuf,
         held_out: bool,
     },
+    /// Takes all logs from the list.
+    Clear,
     /// Stops loading a log, or takes it from the list.
     Remove(u64),
     /// Whether a log takes no part in the estimates.

@@ -141,6 +141,7 @@ impl RefineTab {
                 self.sources.load(&path, held_out, around.waker)?;
                 done.log = Some(path);
             }
+            RefineCommand::Clear => self.sources.list.clear(),
             RefineCommand::Remove(id) => self.sources.remove(id),
             RefineCommand::HoldOut(id, held_out) => self.sources.hold_out(id, held_out),
             RefineCommand::Start(question) => self.start(question, around)?,

@@ -104,6 +104,7 @@ impl Sources {
             self.list.len() - 1
         });
         let source = &mut self.list[place];
+        source.held_out |= held_out;
         source.map = map.entries().to_vec();
         source.loader.start(path, map, waker)?;
         self.path.clear();

@@ -5,7 +5,7 @@
 pub(crate) enum RunsCommand {
     /// Takes the rows out; they can be put back.
     Delete(Vec<u64>),
-    /// Reads the curves of a recording from its file.
+    /// Ticks a recording whose curves are not in memory, and reads them from its file.
     ReadCurves(u64),
     /// Puts back what was taken out last.
     UndoDelete,

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use flqr_core::record::{ColumnMap, Log, Sample};
 
-use super::run::{Channel, Series};
+use super::run::{Channel, Run, Series};
 use crate::history;
 use crate::job::{Job, Outcome, Waker};
 use crate::load::{LoadProgress, load};
@@ -12,13 +12,13 @@ use crate::quantity::Quantity;
 
 /// A row whose curves are being read.
 pub(super) struct Reading {
-    pub(super) number: u64,
+    pub(super) row: Run,
     job: Job<LoadProgress, Result<Series, String>>,
 }
 
 impl Reading {
-    /// Starts to read `file` for row `number`.
-    pub(super) fn start(number: u64, file: &Path, waker: &Waker) -> Result<Self, String> {
+    /// Starts to read `file` for `row`.
+    pub(super) fn start(row: &Run, file: &Path, waker: &Waker) -> Result<Self, String> {
         let file = file.to_owned();
         let read = move |reporter: &crate::job::Reporter<LoadProgress>| {
             let loaded = load(&file, &ColumnMap::default(), 0, reporter)?;
@@ -26,7 +26,7 @@ impl Reading {
         };
         let job = Job::start("read-curves", waker, read)
             .map_err(|error| format!("No thread to read the recording: {error}."))?;
-        Ok(Self { number, job })
+        Ok(Self { row: row.clone(), job })
     }
 
     /// The curves once they are read, or why they are not.

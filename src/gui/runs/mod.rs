@@ -32,8 +32,6 @@ use watch::RecordingWatch;
 #[derive(Default)]
 pub(crate) struct RunsTab {
     ledger: Ledger,
-    /// What was taken out, newest last.
-    deleted: Vec<Vec<Run>>,
     /// Rows that are drawn.
     ticked: BTreeSet<u64>,
     table: RunTable,
@@ -63,24 +61,32 @@ impl RunsTab {
         for mut reading in std::mem::take(&mut self.reading) {
             match reading.drain() {
                 None => self.reading.push(reading),
-                Some(Ok(series)) => self.ledger.set_series(reading.number, series),
+                // The number may be another run's by now, of a session that was opened meanwhile.
+                Some(_) if !self.ledger.has(&reading.row) => {}
+                Some(Ok(series)) => self.ledger.set_series(reading.row.number, series),
                 Some(Err(problem)) => {
-                    self.ticked.remove(&reading.number);
-                    problems.push(format!("Run {} cannot be drawn: {problem}.", reading.number));
+                    self.ticked.remove(&reading.row.number);
+                    problems.push(format!("Run {} cannot be drawn: {problem}.", reading.row.number));
                 }
             }
         }
+        let (ledger, reading) = (&self.ledger, &self.reading);
+        let is_read = |number| reading.iter().any(|reading| reading.row.number == number);
+        let is_drawn = |number| ledger.row(number).is_some_and(|row| row.series.is_some());
+        self.ticked.retain(|number| is_drawn(*number) || is_read(*number));
         problems
     }
 
     fn read_curves(&mut self, number: u64, waker: &Waker) -> Option<String> {
-        let file = self.ledger.row(number)?.file()?;
-        if self.reading.iter().any(|reading| reading.number == number) {
+        let row = self.ledger.row(number)?;
+        let file = row.file()?;
+        if self.reading.iter().any(|reading| reading.row.number == number) {
             return None;
         }
-        match Reading::start(number, file, waker) {
+        match Reading::start(row, file, waker) {
             Ok(reading) => {
                 self.reading.push(reading);
+                self.ticked.insert(number);
                 None
             }
             Err(problem) => Some(problem),
@@ -100,24 +106,14 @@ impl RunsTab {
         match command {
             RunsCommand::ReadCurves(number) => self.read_curves(number, waker),
             RunsCommand::Delete(numbers) => {
-                let rows: Vec<Run> =
-                    numbers.iter().filter_map(|number| self.ledger.remove(*number)).collect();
+                let deleted = self.ledger.delete(&numbers);
                 self.ticked.retain(|number| !numbers.contains(number));
-                if rows.is_empty() {
-                    return None;
-                }
-                let text = format!(
-                    "Deleted {}: Undo delete brings it back.",
-                    listed(rows.iter().map(|row| row.number))
-                );
-                self.deleted.push(rows);
-                Some(text)
+                let text = |deleted| format!("Deleted {}: Undo delete brings it back.", listed(deleted));
+                (!deleted.is_empty()).then(|| text(deleted))
             }
             RunsCommand::UndoDelete => {
-                let rows = self.deleted.pop()?;
-                let text = format!("{} is back.", listed(rows.iter().map(|row| row.number)));
-                rows.into_iter().for_each(|row| self.ledger.put_back(row));
-                Some(text)
+                let back = self.ledger.undo_delete()?;
+                Some(format!("{} is back.", listed(back)))
             }
             RunsCommand::SetNote(number, note) => {
                 self.ledger.row_mut(number)?.note = note;
@@ -135,8 +131,8 @@ impl RunsTab {
     pub(crate) fn take(&mut self, mut ledger: Ledger) -> Ledger {
         ledger.take_series(&self.ledger);
         let before = std::mem::replace(&mut self.ledger, ledger);
-        self.ticked.retain(|number| self.ledger.row(*number).is_some());
-        self.deleted.clear();
+        self.ticked.retain(|number| self.ledger.row(*number).is_some_and(|row| before.has(row)));
+        self.reading.clear();
         before
     }
 
@@ -178,13 +174,13 @@ impl RunsTab {
             "rows": rows,
             "shown": self.ticked,
             "shifts_s": self.overlay.shifts_s(),
-            "can_undo_delete": !self.deleted.is_empty(),
+            "can_undo_delete": self.ledger.has_deleted(),
         })
     }
 
     pub(crate) fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
         let frame = Frame::central_panel(ui.style()).inner_margin(Margin::symmetric(10, 6));
-        if self.ledger.rows().is_empty() && self.deleted.is_empty() {
+        if self.ledger.rows().is_empty() && !self.ledger.has_deleted() {
             let hint = "Every experiment, fit, refinement and recording becomes a row here, with a number that goes with all that is exported of it.";
             CentralPanel::default()
                 .frame(frame)
@@ -198,7 +194,7 @@ impl RunsTab {
             .default_size(height)
             .size_range(110.0..=900.0)
             .show(ui, |ui| {
-                let undo = !self.deleted.is_empty();
+                let undo = self.ledger.has_deleted();
                 self.table.ui(context, &self.ledger, &mut self.ticked, undo, ui);
             });
         let panes = [
@@ -219,7 +215,7 @@ enum Part {
     Changes,
 }
 
-fn listed(numbers: impl Iterator<Item = u64>) -> String {
-    let numbers: Vec<String> = numbers.map(|number| number.to_string()).collect();
+fn listed(numbers: Vec<u64>) -> String {
+    let numbers: Vec<String> = numbers.into_iter().map(|number| number.to_string()).collect();
     format!("{} {}", if numbers.len() == 1 { "run" } else { "runs" }, numbers.join(", "))
 }

@@ -185,6 +185,8 @@ pub(crate) struct Ledger {
     /// The number given last.
     last: u64,
     rows: Vec<Arc<Run>>,
+    /// What was taken out, newest last; no file keeps it.
+    deleted: Vec<Vec<Run>>,
 }
 
 impl PartialEq for Ledger {
@@ -201,14 +203,16 @@ impl Ledger {
     pub(crate) fn add(&mut self, run: Run, unix_s: u64) -> u64 {
         self.last += 1;
         self.rows.push(Arc::new(Run { number: self.last, unix_s, ..run }));
-        self.forget_old_series();
+        self.forget_old_series(self.last);
         self.last
     }
 
-    fn forget_old_series(&mut self) {
-        let mut kept = 0;
-        for run in self.rows.iter_mut().rev() {
-            kept += run.series.as_ref().map_or(0, |series| series.size());
+    /// Keeps the curves of `wanted`, however long, and those of the newest others that fit beside them.
+    fn forget_old_series(&mut self, wanted: u64) {
+        let size = |run: &Run| run.series.as_ref().map_or(0, |series| series.size());
+        let mut kept = self.row(wanted).map_or(0, size);
+        for run in self.rows.iter_mut().rev().filter(|run| run.number != wanted) {
+            kept += size(run);
             if kept > MOST_VALUES && run.series.is_some() {
                 Arc::make_mut(run).series = None;
             }
@@ -248,11 +252,11 @@ impl Ledger {
         let last = value.get("last").and_then(serde_json::Value::as_u64).unwrap_or(0).min(LARGEST_NUMBER);
         let last = rows.last().map_or(0, |row| row.number).max(last);
         let problem = (missing > 0).then(|| format!("“runs” has {missing} rows that cannot be read"));
-        Ok((Self { last, rows }, problem))
+        Ok((Self { last, rows, deleted: Vec::new() }, problem))
     }
 
     /// Whether a row is the same run as one of `other`, whatever has been noted on it since.
-    fn has(&self, row: &Run) -> bool {
+    pub(super) fn has(&self, row: &Run) -> bool {
         self.row(row.number).is_some_and(|here| {
             (here.unix_s, &here.sources, &here.title) == (row.unix_s, &row.sources, &row.title)
         })
@@ -267,7 +271,7 @@ impl Ledger {
     pub(super) fn set_series(&mut self, number: u64, series: Series) {
         if let Some(run) = self.row_mut(number) {
             run.series = Some(Arc::new(series));
-            self.forget_old_series();
+            self.forget_old_series(number);
         }
     }
 
@@ -281,17 +285,29 @@ impl Ledger {
         }
     }
 
-    /// Takes a row out.
-    pub(super) fn remove(&mut self, number: u64) -> Option<Run> {
-        let index = self.rows.iter().position(|run| run.number == number)?;
-        Some(Arc::unwrap_or_clone(self.rows.remove(index)))
+    /// Takes rows out; gives the numbers of those that were there.
+    pub(super) fn delete(&mut self, numbers: &[u64]) -> Vec<u64> {
+        let is_meant = |row: &mut Arc<Run>| numbers.contains(&row.number);
+        let deleted: Vec<Run> = self.rows.extract_if(.., is_meant).map(Arc::unwrap_or_clone).collect();
+        let taken: Vec<u64> = deleted.iter().map(|row| row.number).collect();
+        if !deleted.is_empty() {
+            self.deleted.push(deleted);
+        }
+        taken
     }
 
-    /// Puts a row back to where its number belongs.
-    pub(super) fn put_back(&mut self, run: Run) {
-        let index = self.rows.partition_point(|row| row.number < run.number);
-        self.rows.insert(index, Arc::new(run));
-        self.forget_old_series();
+    /// Puts what was taken out last back to where its numbers belong; gives these.
+    pub(super) fn undo_delete(&mut self) -> Option<Vec<u64>> {
+        let back = self.deleted.pop()?;
+        let numbers: Vec<u64> = back.iter().map(|row| row.number).collect();
+        self.rows.extend(back.into_iter().map(Arc::new));
+        self.rows.sort_by_key(|row| row.number);
+        self.forget_old_series(numbers.last().copied().unwrap_or(0));
+        Some(numbers)
+    }
+
+    pub(super) fn has_deleted(&self) -> bool {
+        !self.deleted.is_empty()
     }
 }
 
@@ -387,11 +403,32 @@ mod tests {
         for expected in 1..=3 {
             assert_eq!(ledger.add(run(0, &presets::paper()), 7), expected);
         }
-        let second = ledger.remove(2).unwrap();
-        ledger.remove(3).unwrap();
+        assert_eq!(ledger.delete(&[3, 9]), [3]);
+        assert_eq!(ledger.delete(&[1, 2]), [1, 2]);
+        assert!(ledger.delete(&[9]).is_empty());
         assert_eq!(ledger.add(run(0, &presets::paper()), 8), 4);
-        ledger.put_back(second);
+        assert_eq!(ledger.undo_delete().unwrap(), [1, 2]);
         assert_eq!(ledger.rows().iter().map(|run| run.number).collect::<Vec<_>>(), [1, 2, 4]);
+        assert_eq!(ledger.undo_delete().unwrap(), [3]);
+        assert_eq!(ledger.undo_delete(), None);
+    }
+
+    #[test]
+    fn curves_that_were_asked_for_stay_however_long_and_others_make_room() {
+        let mut ledger = Ledger::default();
+        let long = |values: usize| Series { time_s: vec![0.0; values], channels: Vec::new() };
+        for _ in 0..3 {
+            ledger.add(run(0, &presets::paper()), 7);
+        }
+        let drawn =
+            |ledger: &Ledger| ledger.rows().iter().map(|run| run.series.is_some()).collect::<Vec<_>>();
+        ledger.set_series(1, long(10));
+        ledger.set_series(3, long(20));
+        assert_eq!(drawn(&ledger), [true, false, true]);
+        ledger.set_series(1, long(MOST_VALUES + 1));
+        assert_eq!(drawn(&ledger), [true, false, false]);
+        ledger.set_series(2, long(30));
+        assert_eq!(drawn(&ledger), [false, true, false]);
     }
 
     #[test]
@@ -402,7 +439,7 @@ mod tests {
         let no_number = run(0, &presets::paper()).with("result.rmse", Value::Number(f64::NAN));
         ledger.add(no_number, 1_700_000_001);
         ledger.add(run(0, &presets::paper()), 1_700_000_002);
-        ledger.remove(3).unwrap();
+        assert_eq!(ledger.delete(&[3]), [3]);
         let value: serde_json::Value = serde_json::from_str(&ledger.to_value().to_string()).unwrap();
         let (mut read, problem) = Ledger::from_value(&value).unwrap();
         assert_eq!(problem, None);

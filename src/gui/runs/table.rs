@@ -199,11 +199,10 @@ fn tick_ui(context: &ViewContext<'_>, run: &Run, ticked: &mut BTreeSet<u64>, ui:
     if check.on_hover_text(help).on_disabled_hover_text(help).changed() {
         if !tick {
             ticked.remove(&number);
-        } else {
+        } else if drawn {
             ticked.insert(number);
-            if !drawn {
-                context.commands.send(Command::Runs(RunsCommand::ReadCurves(number)));
-            }
+        } else {
+            context.commands.send(Command::Runs(RunsCommand::ReadCurves(number)));
         }
     }
     if tick && drawn {
