@@ -2,7 +2,7 @@
 
 use std::sync::LazyLock;
 
-use flqr_core::control::{BalanceController, ControllerKind, DEFAULT_COMPENSATION};
+use flqr_core::control::{BalanceController, ControlError, ControllerKind, DEFAULT_COMPENSATION};
 use flqr_core::friction::{Compensation, Stribeck};
 use flqr_core::lqr::Weights;
 use flqr_core::model_file::{AxisParameters, Model, Rig, RobotModel, Tolerances, presets};
@@ -121,8 +121,42 @@ impl Session {
     /// Why FLQR would do nothing more than LQR, if it would.
     pub(crate) fn feedforward_problem(&self) -> Option<&'static str> {
         let robot = self.robot()?;
-        robot.friction.iter().all(Option::is_none).then_some(
+        let has_friction = robot.friction.iter().any(Option::is_some);
+        // An effect inside the motors is fed forward too.
+        let is_lqr = || {
+            let flqr = BalanceController::new(ControllerKind::Flqr, robot, Matrix2x4::zeros());
+            matches!(flqr, Err(ControlError::NoFriction))
+        };
+        (!has_friction && is_lqr()).then_some(
             "The model has no friction, so FLQR equals LQR: fit a log on the friction tab, or tick a motor under “Friction of the motors”.",
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use flqr_core::effects::{Effect, MachineKind};
+
+    use super::*;
+
+    #[test]
+    fn flqr_is_lqr_only_where_nothing_is_fed_forward() {
+        let (mut model, cogging) =
+            (presets::paper(), [("order_1", 14.0), ("cos_1_nm", 0.01), ("sin_1_nm", 0.0)]);
+        let cogging = Effect::new("cogging", MachineKind::Robot, None, cogging).unwrap();
+        for (friction, effects, is_lqr) in
+            [(true, false, false), (false, false, true), (false, true, false), (true, true, false)]
+        {
+            if let Rig::Robot(robot) = &mut model.rig {
+                let curves = presets::paper().robot().unwrap().friction;
+                robot.friction = if friction { curves } else { [None; 2] };
+                robot.effects = if effects { vec![cogging.clone()] } else { Vec::new() };
+            }
+            let session = Session::new(model.clone(), ControllerKind::Flqr);
+            assert_eq!(session.feedforward_problem().is_some(), is_lqr, "{friction} {effects}");
+            let controller = session.balance_controller(Matrix2x4::zeros()).unwrap();
+            let feeds = controller.feedforward.iter().any(Option::is_some) || controller.effects.is_some();
+            assert_eq!(feeds, !is_lqr, "{friction} {effects}");
+        }
     }
 }
