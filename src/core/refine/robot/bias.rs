@@ -12,7 +12,7 @@ use super::candidates::Candidate;
 use super::channels::Channels;
 use super::found;
 use super::nuisance::nuisances;
-use super::search::{Chance, Fit, Search, whitened};
+use super::search::{Fit, Search, whitened};
 use super::twin::{Levels, Twin};
 
 /// Simulated robots.
@@ -73,10 +73,10 @@ fn refitted(known: &Found<'_>, twin: &Twin<'_>, levels: Levels, seed: u64) -> Op
     let mut free = nuisances(&trace, twin.known);
     let plain = Channels::new(&trace, &target);
     whitened(&mut picks, &mut free, &plain, NonZeroUsize::MIN);
-    let rough = Search::new(&trace, &plain, &free, &[], &target, &Chance::default);
+    let rough = Search::new(&trace, &plain, &free, &[], &target, &|| 0.0);
     let left = rough.left_raw(&picks, &rough.fit(&picks)?.judged.coefficients);
     let channels = Channels::new(&trace, &left);
     whitened(&mut picks, &mut free, &channels, NonZeroUsize::MIN);
-    let search = Search::new(&trace, &channels, &free, &[], &target, &Chance::default);
+    let search = Search::new(&trace, &channels, &free, &[], &target, &|| 0.0);
     Some(search.fit(&picks)?.judged.coefficients.split_off(free.len()))
 }

@@ -8,7 +8,7 @@ use crate::refine::largest::exceeded_by;
 use super::candidates::library;
 use super::channels::Channels;
 use super::nuisance::nuisances;
-use super::search::{Chance, Search, whitened};
+use super::search::{Search, whitened};
 use super::twin::{Levels, Twin};
 
 /// Clean robots, and the share of such sets of effects that the largest of them may exceed.
@@ -20,18 +20,15 @@ const LEAST_SCALE: f64 = 0.1;
 
 /// Multiple of what it needs that the largest of all effects exceeds in one of a hundred clean robots; 0 where none can
 /// be simulated.
-pub(super) fn largest_gain(twin: &Twin<'_>, levels: Levels, seed: u64) -> Chance {
+pub(super) fn largest_gain(twin: &Twin<'_>, levels: Levels, seed: u64) -> f64 {
     let seeds: Vec<u64> =
         (1..=ROBOTS).map(|robot| seed.wrapping_mul(ROBOTS + 1).wrapping_add(robot)).collect();
     let gains = parallel::map(&seeds, super::THREADS, |&seed| largest(twin, levels, seed));
-    let gains: Vec<Chance> = gains.into_iter().flatten().collect();
-    let reached =
-        |of: fn(&Chance) -> f64| exceeded_by(&gains.iter().map(of).collect::<Vec<_>>(), LEVEL, LEAST_SCALE);
-    Chance { lasting: reached(|gain| gain.lasting), brief: reached(|gain| gain.brief) }
+    exceeded_by(&gains.into_iter().flatten().collect::<Vec<_>>(), LEVEL, LEAST_SCALE)
 }
 
-/// The largest gains that anything has in one clean robot.
-fn largest(twin: &Twin<'_>, levels: Levels, seed: u64) -> Option<Chance> {
+/// The largest gain that anything has in one clean robot.
+fn largest(twin: &Twin<'_>, levels: Levels, seed: u64) -> Option<f64> {
     let trace = twin.trace(levels, seed)?;
     let target = trace.residual();
     let channels = Channels::new(&trace, &target);
@@ -39,5 +36,5 @@ fn largest(twin: &Twin<'_>, levels: Levels, seed: u64) -> Option<Chance> {
     let alone = NonZeroUsize::MIN;
     let (mut free, mut tried) = (nuisances(&trace, twin.known), library(&trace, alone));
     whitened(&mut tried, &mut free, &channels, alone);
-    Some(Search::new(&trace, &channels, &free, &tried, &target, &Chance::default).largest())
+    Some(Search::new(&trace, &channels, &free, &tried, &target, &|| 0.0).largest())
 }

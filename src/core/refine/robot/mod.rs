@@ -44,7 +44,7 @@ use channels::Channels;
 use motion::Readings;
 pub(super) use motion::{at_even_times, fresh_rows};
 use nuisance::{KEYS, Known, Nuisance, nuisances};
-use search::{Chance, Fit, Search, whitened};
+use search::{Fit, Search, whitened};
 use trace::{Pair, Part, Trace};
 use twin::{Levels, Twin};
 
@@ -203,12 +203,12 @@ fn by_chance(
     free: &[Nuisance],
     target: &Pair,
     (known, seed): (Known<'_>, u64),
-) -> Chance {
-    let search = Search::new(trace, channels, free, &[], target, &Chance::default);
-    let Some(bare) = search.fit(&[]) else { return Chance::default() };
+) -> f64 {
+    let search = Search::new(trace, channels, free, &[], target, &|| 0.0);
+    let Some(bare) = search.fit(&[]) else { return 0.0 };
     let corrections: Vec<(&Nuisance, f64)> = free.iter().zip(bare.judged.coefficients).collect();
     twin(trace, known, channels, &corrections, seed)
-        .map_or(Chance::default(), |(twin, levels)| chance::largest_gain(&twin, levels, seed))
+        .map_or(0.0, |(twin, levels)| chance::largest_gain(&twin, levels, seed))
 }
 
 /// Takes off what the chain itself adds to the sizes.

@@ -60,7 +60,7 @@ fn corrected(model: &Model, log: &Log, estimate: &[String]) -> Vec<Corrected> {
     let channels = Channels::new(&trace, &target);
     let mut free = nuisances(&trace, Known { tolerances: &model.tolerance, estimate });
     whitened(&mut [], &mut free, &channels, THREADS);
-    let search = Search::new(&trace, &channels, &free, &[], &target, &Chance::default);
+    let search = Search::new(&trace, &channels, &free, &[], &target, &|| 0.0);
     corrections(&free, &search.fit(&[]).unwrap())
 }
 
@@ -104,7 +104,7 @@ fn of_equal_effects_the_simpler_is_named() {
         let (mut free, mut tried) = (nuisances(&trace, known), library(&trace, THREADS));
         tried.retain(|candidate| ["ground_slope", "tether_spring"].contains(&candidate.kind.id));
         whitened(&mut tried, &mut free, &channels, THREADS);
-        let mut search = Search::new(&trace, &channels, &free, &tried, &target, &Chance::default);
+        let mut search = Search::new(&trace, &channels, &free, &tried, &target, &|| 0.0);
         search.picks =
             tried.iter().filter(|candidate| candidate.kind.id == "tether_spring").cloned().collect();
         search.simplify();

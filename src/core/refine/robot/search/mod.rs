@@ -41,17 +41,10 @@ pub(super) struct Search<'a> {
     pub(super) picks: Vec<Candidate>,
     /// What was tried first, each alone beside the nuisances.
     pub(super) tried: Vec<(Candidate, Fit)>,
-    /// What clean robots reach by chance.
-    by_chance: &'a (dyn Fn() -> Chance + Sync),
+    /// Largest gain that clean robots reach by chance, as a multiple of the least that it needs.
+    by_chance: &'a (dyn Fn() -> f64 + Sync),
     /// Threads that share the work; the answer does not depend on them.
     pub(super) threads: NonZeroUsize,
-}
-
-/// Largest gains as multiples of the least that each needs: of what lasts, and of what is there for a moment.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Chance {
-    pub(super) lasting: f64,
-    pub(super) brief: f64,
 }
 
 /// A fit of nuisances and picks.
@@ -91,7 +84,7 @@ impl<'a> Search<'a> {
         nuisances: &'a [Nuisance],
         library: &'a [Candidate],
         raw_target: &'a Pair,
-        by_chance: &'a (dyn Fn() -> Chance + Sync),
+        by_chance: &'a (dyn Fn() -> f64 + Sync),
     ) -> Self {
         let rows = channels.rows();
         let seconds = rows.len() as f64 * trace.step_s();

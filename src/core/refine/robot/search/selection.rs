@@ -5,7 +5,7 @@ use crate::parallel;
 use crate::refine::error::RefineError;
 
 use super::screen::Screen;
-use super::{Candidate, Chance, Fit, Search};
+use super::{Candidate, Fit, Search};
 use crate::refine::robot::found::held_out_error;
 
 /// Share of the error on left-out blocks that an effect must explain, and the least in units of the noise: of one of
@@ -20,10 +20,8 @@ const OF_A_SHAPE: f64 = 2.0;
 /// the least of a hundred.
 pub(in crate::refine::robot) const LEAST_Z: f64 = 3.0;
 const SURE_Z: f64 = 6.0;
-/// Least impulse of a push as a share of the weight, s: sticking that lets go looks like a smaller one, which has to be
-/// so many times beyond what clean robots do.
+/// Least impulse of a push as a share of the weight, s: sticking that lets go looks like a smaller one.
 const LEAST_IMPULSE_S: f64 = 0.003;
-const BEYOND_STICKING: f64 = 1.5;
 /// Time within which pushes are one, s, and the share of their gain that the strongest must have alone.
 const ONE_PUSH_S: f64 = 1.5;
 const MOST_OF_A_PUSH: f64 = 0.9;
@@ -100,15 +98,13 @@ impl Search<'_> {
         }
         if last.kind.trial.brief {
             let impulse = with.judged.coefficients[with.members.len() - 1].abs() * last.shape[1];
-            let is_strong = impulse >= LEAST_IMPULSE_S * self.trace.machine.weight_n();
-            let sticking = || BEYOND_STICKING * (self.by_chance)().brief;
-            return is_strong || (f64::MIN_POSITIVE..beyond).contains(&sticking());
+            return impulse >= LEAST_IMPULSE_S * self.trace.machine.weight_n();
         }
         let needed = if gain > self.least(before.score) { LEAST_Z } else { SURE_Z };
         let is_sure = self.is_momentary(last) || self.z(last, with) > needed;
         // What sticking mimics on clean robots too is in doubt however large it is.
         let is_plain = last.kind.trial.caution <= 1.0;
-        is_sure && (is_plain && beyond > DOUBT || beyond > (self.by_chance)().lasting)
+        is_sure && (is_plain && beyond > DOUBT || beyond > (self.by_chance)())
     }
 
     /// Drops picks that are not far beyond what chance does and do not lower the error on rows that no fit has seen, and
@@ -169,15 +165,12 @@ impl Search<'_> {
     }
 
     /// The largest gain of anything that is tried beside nothing else, as a multiple of the least that it needs.
-    pub(in crate::refine::robot) fn largest(&self) -> Chance {
-        let mut largest = Chance::default();
-        let Some(bare) = self.fit(&[]) else { return largest };
-        for (pick, fit) in self.ranked(&[], &bare) {
-            let beyond = (bare.score - fit.score) / self.least_of(pick.kind, bare.score);
-            let own = if pick.kind.trial.brief { &mut largest.brief } else { &mut largest.lasting };
-            *own = own.max(beyond);
-        }
-        largest
+    pub(in crate::refine::robot) fn largest(&self) -> f64 {
+        let Some(bare) = self.fit(&[]) else { return 0.0 };
+        let gains = self.ranked(&[], &bare).into_iter().filter(|(pick, _)| !pick.kind.trial.brief);
+        gains
+            .map(|(pick, fit)| (bare.score - fit.score) / self.least_of(pick.kind, bare.score))
+            .fold(0.0, f64::max)
     }
 
     /// Replaces picks where another does better, and drops those that others have made needless.
