@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use clap::Args;
-use flqr_core::refine::{self, ClosedLoop, Fate, LoopRun, Options, Refinement, Verdict};
+use flqr_core::refine::{self, ClosedLoop, Corrected, Fate, LoopRun, Options, Refinement, Verdict};
 
 use super::output::{Failure, Output, complain, number};
 use super::progress::Progress;
@@ -73,7 +73,11 @@ pub(crate) fn print(out: &mut dyn Write, found: &Refinement) -> io::Result<()> {
     };
     writeln!(out, "{verdict}")?;
     for effect in &found.effects {
-        writeln!(out, "\n{}, error lower by {:.1} %", effect.effect.id(), effect.error_drop_percent)?;
+        write!(out, "\n{}, error lower by {:.1} %", effect.effect.id(), effect.error_drop_percent)?;
+        match effect.error_drop_ci95 {
+            Some([low, high]) => writeln!(out, " ({low:.1} to {high:.1})")?,
+            None => writeln!(out)?,
+        }
         for (n, (key, value)) in effect.effect.parameters().iter().enumerate() {
             write!(out, "  {key:24}{:>14}", number(*value))?;
             match effect.ci95[n] {
@@ -95,11 +99,14 @@ pub(crate) fn print(out: &mut dyn Write, found: &Refinement) -> io::Result<()> {
         let name = format!("{} {}", tried.kind.id, tried.detail);
         writeln!(out, "{:45}{:>12.1} %   {}", name.trim(), tried.gain_percent, tried.fate)?;
     }
-    writeln!(out)?;
-    print_errors(out, &[("before", &found.before), ("after", &found.after)])?;
+    if !found.before.rmse.0.is_empty() {
+        writeln!(out)?;
+        print_errors(out, &[("before", &found.before), ("after", &found.after)])?;
+    }
     if !found.unexplained.description.is_empty() {
         writeln!(out, "unexplained: {}", found.unexplained.description)?;
     }
+    print_parameters(out, &found.parameters)?;
     if let Some(closed_loop) = &found.closed_loop {
         print_closed_loop(out, closed_loop)?;
     }
@@ -110,6 +117,26 @@ pub(crate) fn print(out: &mut dyn Write, found: &Refinement) -> io::Result<()> {
         }
     }
     print_health(out, &found.data_health)
+}
+
+/// Declared numbers that the refined model has otherwise, or that the log does not tell.
+fn print_parameters(out: &mut dyn Write, parameters: &[Corrected]) -> io::Result<()> {
+    for (n, own) in parameters.iter().enumerate() {
+        if n == 0 {
+            writeln!(
+                out,
+                "\n{:26}{:>14}{:>14}   95 % interval",
+                "declared numbers", "declared", "re-estimated"
+            )?;
+        }
+        let now = if own.value == own.declared { "kept".to_owned() } else { number(own.value) };
+        write!(out, "  {:24}{:>14}{now:>14}", own.key, number(own.declared))?;
+        match own.ci95 {
+            Some([low, high]) => writeln!(out, "   {} to {}", number(low), number(high))?,
+            None => writeln!(out)?,
+        }
+    }
+    if parameters.is_empty() { Ok(()) } else { writeln!(out) }
 }
 
 /// The simulated robot under both controllers, and what becomes of each effect.

@@ -117,11 +117,13 @@ fn print_predictions(out: &mut dyn Write, errors: &[(&str, &Errors)]) -> io::Res
         write!(out, "{what:45}")?;
         for (_, errors) in errors {
             let own = errors.prediction.get(index);
-            write!(out, "{:>14}", own.map_or(String::new(), |own| number(own.rmse.value)))?;
+            let shown = own.map(|own| if own.told { number(own.rmse.value) } else { "-".to_owned() });
+            write!(out, "{:>14}", shown.unwrap_or_default())?;
         }
         let last = errors.last().and_then(|(_, last)| last.prediction.get(index)).unwrap_or(prediction);
         let (noise, motion) = (number(last.noise_floor.value), number(last.motion.value));
-        writeln!(out, " {} (noise {noise}, motion {motion})", prediction.rmse.unit)?;
+        let why = if last.told { "" } else { ": noise at the start alone grows beyond the motion" };
+        writeln!(out, " {} (noise {noise}, motion {motion}{why})", prediction.rmse.unit)?;
     }
     Ok(())
 }

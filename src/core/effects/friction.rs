@@ -232,16 +232,6 @@ pub(super) static VISCOUS_ERROR: EffectKind = EffectKind {
     },
 };
 
-/// Friction of a motor of which nothing is declared.
-const NONE: StribeckParameters = StribeckParameters {
-    coulomb_nm: 0.0,
-    static_nm: 0.0,
-    viscous_nm_s_rad: 0.0,
-    stribeck_speed_rad_s: 1.0,
-    stribeck_exponent: 1.0,
-    offset_nm: 0.0,
-};
-
 /// Corrects the declared curves of the motors that the effect is in. A correction that leaves no possible curve, as a
 /// level below 0, is not made.
 fn correct_friction(
@@ -251,7 +241,8 @@ fn correct_friction(
 ) -> bool {
     let added = effect.parameters()[0].1;
     let new = |curve: Option<Stribeck>| {
-        Stribeck::new(corrected(curve.map_or(NONE, |curve| *curve.parameters()), added)).ok()
+        Stribeck::new(corrected(curve.map_or(StribeckParameters::NONE, |curve| *curve.parameters()), added))
+            .ok()
     };
     match model {
         Declared::Robot(robot) => {

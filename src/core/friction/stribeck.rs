@@ -22,6 +22,18 @@ pub struct StribeckParameters {
     pub offset_nm: f64,
 }
 
+impl StribeckParameters {
+    /// No friction at all.
+    pub const NONE: Self = Self {
+        coulomb_nm: 0.0,
+        static_nm: 0.0,
+        viscous_nm_s_rad: 0.0,
+        stribeck_speed_rad_s: 1.0,
+        stribeck_exponent: 1.0,
+        offset_nm: 0.0,
+    };
+}
+
 /// A Stribeck curve whose parameters have been checked.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stribeck {

@@ -492,6 +492,23 @@ mod tests {
         assert_eq!(Model::from_toml(&text, "again").unwrap(), refined);
     }
 
+    /// Dry friction that is cancelled whole swings where it is a little less than estimated.
+    #[test]
+    fn an_effect_that_makes_the_loop_swing_is_refused_and_the_reason_says_where() {
+        let declared = presets::paper();
+        let mut refined = declared.clone();
+        let Rig::Robot(robot) = &mut refined.rig else { unreachable!() };
+        let parameters = [("speed_rad_s", 1.0), ("level_nm", 0.3)];
+        robot.effects.push(Effect::new("low_speed_friction", MachineKind::Robot, None, parameters).unwrap());
+        let found = watched(&declared, &mut refined, &["low_speed_friction"], 1);
+        let fed = &found.feedforward[0];
+        assert!(!fed.used && fed.reason.starts_with("left out: with it and "), "{found:?}");
+        assert!(!effects_of(&refined)[0].is_fed_forward());
+        // The controller of after leaves it out, so that the loop is the one of before.
+        let station = &found.scenarios[0];
+        assert!(!station.after.fell && station.after.x_m.std <= 1.05 * station.before.x_m.std, "{station:?}");
+    }
+
     #[test]
     fn trials_end_when_they_are_cancelled() {
         let (declared, mut refined) = (presets::paper(), with_cogging(0.05));

@@ -21,6 +21,7 @@ mod closed_loop;
 mod demo;
 mod error;
 mod explorer;
+mod gain;
 mod largest;
 mod left_out;
 mod next_experiment;
@@ -30,6 +31,7 @@ mod prediction;
 mod rates;
 mod robot;
 pub mod select;
+mod split;
 mod verdict;
 pub mod whiten;
 

@@ -119,6 +119,8 @@ fn of_rest(found: &Refinement, asked: &Asked<'_>) -> Option<NextExperiment> {
     }
     let runs = runs(&found.model);
     let on = |scenario: Scenario| runs.iter().find(|run| run.experiment.scenario == scenario);
+    let swings = matches!(&found.model.rig, Rig::Axis(axis)
+        if matches!(axis.parameters, AxisParameters::Rotary { gravity_torque_nm, .. } if gravity_torque_nm != 0.0));
     let (words, run) = match left.depends_on.first().map(String::as_str) {
         Some("time_s") | None => {
             let words = "the same run again, to see whether it comes back at the same time".to_owned();
@@ -129,6 +131,13 @@ fn of_rest(found: &Refinement, asked: &Asked<'_>) -> Option<NextExperiment> {
         Some(name) if name.contains("angle") => (name, on(Scenario::FrictionSweep)),
         Some(name) => (name, on(Scenario::Cruise)),
     };
+    if swings {
+        let summary = format!(
+            "a run in which {words} varies more: the load lifted slowly and let down slowly over its whole range, then \
+             swung at several speeds"
+        );
+        return Some(NextExperiment::in_words(summary));
+    }
     let summary = match run {
         Some(run) => format!("a run in which {words} varies more: {}", run.words),
         None => format!("a run in which {words} varies while all else is kept as even as can be"),
@@ -190,8 +199,17 @@ fn runs(model: &Model) -> Vec<Run> {
     ];
     match &model.rig {
         Rig::Axis(axis) => {
-            if matches!(axis.parameters, AxisParameters::Linear { .. }) {
-                found.clear();
+            match axis.parameters {
+                AxisParameters::Linear { .. } => found.clear(),
+                // A load that swings cannot turn at a constant speed.
+                AxisParameters::Rotary { gravity_torque_nm, .. } if gravity_torque_nm != 0.0 => {
+                    found.retain(|run| run.experiment.scenario == Scenario::Multisine);
+                    found
+                        .iter_mut()
+                        .for_each(|run| run.words = "torques of many frequencies about where it hangs");
+                    return found;
+                }
+                AxisParameters::Rotary { .. } => {}
             }
             for (run, words) in found.iter_mut().zip([
                 "33 constant speeds, both ways",
@@ -526,6 +544,7 @@ mod tests {
             ci95: vec![None; effect.parameters().len()],
             units: vec!["1"; effect.parameters().len()],
             error_drop_percent: 50.0,
+            error_drop_ci95: None,
             ambiguous_with: vec![effects::kind(rival).unwrap()],
             effect,
         };
@@ -566,6 +585,22 @@ mod tests {
         assert!(command.starts_with("flqr simulate 'my robot.toml' --scenario "), "{command}");
         assert!(next.scenario.is_some_and(|scenario| command.contains(&scenario)));
         assert!(command.contains(" --seed 1 ") && !command.contains("--motor"), "{command}");
+    }
+
+    #[test]
+    fn a_load_that_swings_is_not_asked_to_turn_at_a_constant_speed() {
+        let model = |gravity: &str| {
+            let text = format!(
+                "name = \"arm\"\n[axis]\nkind = \"rotary\"\ninertia_kg_m2 = 0.03\n{gravity}[friction]\n\
+                 coulomb_nm = 0.1\nviscous_nm_s_rad = 0.01\n"
+            );
+            Model::from_toml(&text, "arm.toml").unwrap()
+        };
+        let scenarios = |model: &Model| -> Vec<Scenario> {
+            runs(model).iter().map(|run| run.experiment.scenario).collect()
+        };
+        assert_eq!(scenarios(&model("gravity_torque_nm = 1.5\n")), [Scenario::Multisine]);
+        assert_eq!(scenarios(&model("")).len(), 5);
     }
 
     #[test]

@@ -34,8 +34,10 @@ pub(super) fn document(found: &Refinement, logs: &[Log]) -> Document {
             simulated(closed_loop, &mut blocks);
         }
         remains(found, &mut blocks);
-        blocks.push(Block::section("Declared numbers as this log has them"));
-        blocks.push(Block::Table(parameters(found)));
+        if !found.parameters.is_empty() {
+            blocks.push(Block::section("Declared numbers as this log has them"));
+            blocks.push(Block::Table(parameters(found)));
+        }
     }
     let summary = format!(
         "What the logs say about the model {}: its residual, the effects that it lacks, and the error on rows that took no \
@@ -254,11 +256,12 @@ fn errors(found: &Refinement) -> Table {
 fn predictions(found: &Refinement) -> Table {
     let row = |(before, after): (&Prediction, &Prediction)| {
         let cell = |quantity: &Quantity| number(quantity.value);
+        let error = |own: &Prediction| if own.told { cell(&own.rmse) } else { Cell::text("—") };
         vec![
             Cell::text(before.variable),
             Cell::Number(format!("{:.0}", 1e3 * before.horizon_s)),
-            cell(&before.rmse),
-            cell(&after.rmse),
+            error(before),
+            error(after),
             cell(&after.noise_floor),
             cell(&before.motion),
             Cell::text(before.rmse.unit),
@@ -277,13 +280,16 @@ fn predictions(found: &Refinement) -> Table {
         ],
         rows: found.before.prediction.iter().zip(&found.after.prediction).map(row).collect(),
         note: "Root mean squares over held-out starts. Noise alone: what the scatter of the readings at the start and the end \
-               makes of it. A robot that balances is unstable, so that its noise grows with the horizon."
+               makes of it. A robot that balances is unstable, so that its noise grows with the horizon; where that alone is \
+               more than the motion, the error tells nothing and a dash stands in its place."
             .to_owned(),
     }
 }
 
 fn simulated(closed_loop: &ClosedLoop, blocks: &mut Vec<Block>) {
-    blocks.push(Block::section("The closed loop, simulated"));
+    let heading =
+        if closed_loop.scenarios.is_empty() { "In the controller" } else { "The closed loop, simulated" };
+    blocks.push(Block::section(heading));
     let mut rows = Vec::new();
     for pair in &closed_loop.scenarios {
         let both = |what: &str, of: &dyn Fn(&LoopRun) -> f64, unit: &'static str| {
@@ -369,6 +375,8 @@ fn parameters(found: &Refinement) -> Table {
             Column::grouped("95 % interval", "to", ""),
         ],
         rows: found.parameters.iter().map(row).collect(),
-        note: String::new(),
+        note: "A free number that this log does not tell from the declared one stays as declared; its interval is what the \
+               log alone says."
+            .to_owned(),
     }
 }

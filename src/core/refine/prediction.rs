@@ -9,6 +9,7 @@ use std::num::NonZeroUsize;
 
 use nalgebra::{DMatrix, DVector};
 
+use super::split::split_s;
 use super::verdict::{Prediction, Quantity};
 use crate::effects::{EffectLaw, Law, Machine, Moment, RobotLaws};
 use crate::model_file::{AxisParameters, Model, Rig, RobotModel};
@@ -24,9 +25,6 @@ const STARTS: usize = 40;
 /// Half of the window of a local fit: of the motors' and axes' angles, and of the IMU, s.
 const ANGLE_HALF_S: f64 = 0.008;
 const IMU_HALF_S: f64 = 0.03;
-/// The part of a log that is held out, and the gap before it.
-const FIRST_HELD_OUT: f64 = 2.0 / 3.0;
-const GAP_S: f64 = 0.5;
 /// Longest step of the integration, s.
 const STEP_S: f64 = 5e-4;
 
@@ -90,7 +88,9 @@ fn summed(names: &[(&'static str, &'static str)], runs: &[Ends]) -> Vec<Predicti
                 let sum: f64 = ends.iter().map(|end| end[n] * end[n]).sum();
                 Quantity::new((sum / ends.len() as f64).sqrt(), unit)
             };
-            found.push(Prediction { variable, horizon_s, rmse: rms(0), motion: rms(1), noise_floor: rms(2) });
+            let [rmse, motion, noise_floor] = [0, 1, 2].map(rms);
+            let told = noise_floor.value < motion.value;
+            found.push(Prediction { variable, horizon_s, rmse, motion, noise_floor, told });
         }
     }
     found
@@ -196,7 +196,7 @@ impl Record {
         let count = self.time_s.len();
         let first = match rows {
             Rows::All => 0,
-            Rows::LastThird => (FIRST_HELD_OUT * count as f64) as usize + (GAP_S / self.dt_s) as usize,
+            Rows::LastThird => (split_s(count as f64 * self.dt_s)[1] / self.dt_s) as usize,
         };
         let (margin, ahead) = (self.margin(), self.ahead(HORIZONS_S[HORIZONS_S.len() - 1]));
         let step = ((0.25 / self.dt_s) as usize).max(1);

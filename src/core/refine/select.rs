@@ -275,7 +275,9 @@ fn fit(gram: &DMatrix<f64>, members: &[Member], noise: f64) -> Option<Vec<f64>> 
         let beyond = |member: usize| {
             let [low, high] = members[member].bounds;
             let over = (values[member] - high).max(low - values[member]);
-            if over > 0.0 { over / (high - low).max(1e-300) } else { 0.0 }
+            // A bound on one side alone has no width to measure by.
+            let width = if (high - low).is_finite() { high - low } else { values[member].abs() };
+            if over > 0.0 { over / width.max(1e-300) } else { 0.0 }
         };
         let worst = free.iter().copied().max_by(|&a, &b| beyond(a).total_cmp(&beyond(b)));
         match worst.filter(|&member| beyond(member) > 0.0) {
@@ -379,6 +381,9 @@ mod tests {
         let bounded = Member { bounds: [-3.0, 1.5], ..Member::free(0) };
         let found = blocks.fit(&[bounded, Member::free(1)], 0.01).unwrap();
         assert_eq!(found[0], 1.5);
+        let one_sided = Member { bounds: [-0.5, f64::INFINITY], ..Member::free(1) };
+        let found = blocks.fit(&[Member::free(0), one_sided], 0.01).unwrap();
+        assert_eq!(found[1], -0.5);
         // A number that is known within a hundredth moves no further.
         let found = blocks.fit(&[Member::within(0, 0.01), Member::free(1)], 0.01).unwrap();
         assert_eq!(found[0], 0.01);

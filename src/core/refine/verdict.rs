@@ -74,6 +74,9 @@ pub struct Prediction {
     pub motion: Quantity,
     /// What noise of the sensors alone makes of the error.
     pub noise_floor: Quantity,
+    /// Whether the error tells anything: a machine that is unstable by itself grows noise of the readings at the start
+    /// beyond the motion.
+    pub told: bool,
 }
 
 /// How far a model is from a log.
@@ -137,6 +140,8 @@ pub struct Found {
     pub units: Vec<&'static str>,
     /// By how much the error on held-out rows falls with it, in percent of the error without it.
     pub error_drop_percent: f64,
+    /// 95 % interval of that, by blocks of the held-out rows; none where it was not worked out.
+    pub error_drop_ci95: Option<[f64; 2]>,
     /// Others that this log cannot tell from it.
     pub ambiguous_with: Vec<&'static EffectKind>,
 }
@@ -151,6 +156,9 @@ impl Serialize for Found {
         }
         map.serialize_entry("parameters", &Parameters(self))?;
         map.serialize_entry("error_drop_percent", &self.error_drop_percent)?;
+        if let Some(ci95) = self.error_drop_ci95 {
+            map.serialize_entry("error_drop_ci95", &ci95)?;
+        }
         let others: Vec<&str> = self.ambiguous_with.iter().map(|kind| kind.id).collect();
         map.serialize_entry("ambiguous_with", &others)?;
         map.end()

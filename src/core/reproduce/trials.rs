@@ -141,15 +141,7 @@ fn ideal(robot: &mut RobotModel) {
 }
 
 fn without_friction([declared, actual]: [&mut RobotModel; 2]) {
-    let none = Stribeck::new(StribeckParameters {
-        coulomb_nm: 0.0,
-        static_nm: 0.0,
-        viscous_nm_s_rad: 0.0,
-        stribeck_speed_rad_s: 1.0,
-        stribeck_exponent: 1.0,
-        offset_nm: 0.0,
-    });
-    let none = none.expect("no friction is a friction");
+    let none = Stribeck::new(StribeckParameters::NONE).expect("no friction is a friction");
     for robot in [declared, actual] {
         robot.friction = [Some(none); 2];
     }

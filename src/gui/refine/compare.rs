@@ -1,7 +1,7 @@
 //! Errors before and after, on rows that took no part in the estimates.
 
 use egui::{Grid, RichText, Ui};
-use flqr_core::refine::{Channels, ClosedLoop, Errors, LoopRun, Quantity, Refinement, Residual};
+use flqr_core::refine::{Channels, ClosedLoop, Errors, LoopRun, Prediction, Quantity, Refinement, Residual};
 
 use super::strip::{StepState, Tone};
 use crate::widgets::{hint_ui, mono, section_ui, shown};
@@ -53,10 +53,11 @@ fn rows(first: &Errors, second: Option<&Errors>) -> Vec<Row> {
     rows.extend(channels("noise of the sensors alone", |errors| &errors.noise_floor));
     rows.extend(channels("residual by the torque or force", |errors| &errors.nrmse));
     for (index, prediction) in first.prediction.iter().enumerate() {
-        let after = second.and_then(|second| second.prediction.get(index)).map(|p| p.rmse.value);
+        let shown_of = |own: &Prediction| own.told.then_some(own.rmse.value);
+        let after = second.and_then(|second| second.prediction.get(index)).and_then(shown_of);
         rows.push(Row {
             name: format!("{} after {} ms", prediction.variable, shown(1e3 * prediction.horizon_s, 3)),
-            values: [Some(prediction.rmse.value), after],
+            values: [shown_of(prediction), after],
             unit: prediction.rmse.unit,
         });
     }

@@ -98,7 +98,10 @@ impl Candidate {
         if self.is_gain() {
             return vec![Member { column: first, spread: f64::INFINITY, bounds: [-0.6, 1.5] }];
         }
-        let ranges = self.kind.amplitudes().map(|parameter| parameter.range(machine));
+        let ranges = self.kind.amplitudes().map(|parameter| {
+            let [low, high] = parameter.range(machine);
+            [if parameter.opposing { low.max(0.0) } else { low }, high]
+        });
         let member = |(index, bounds)| Member { column: first + index, spread: f64::INFINITY, bounds };
         ranges.enumerate().map(member).collect()
     }
@@ -109,6 +112,8 @@ impl Candidate {
 pub(super) struct Scales {
     pub(super) speed: f64,
     pub(super) fastest: f64,
+    /// Speed that all but a twentieth of the rows exceed, where the motion goes one way; 0 where it passes through rest.
+    pub(super) slowest: f64,
     pub(super) travel: f64,
     pub(super) effort: f64,
     pub(super) largest_effort: f64,
@@ -132,6 +137,7 @@ impl Scales {
         Self {
             speed: rms(&speeds),
             fastest: largest(&speeds),
+            slowest: if rows.both_ways() { 0.0 } else { lowest_twentieth(&speeds) },
             travel: range[1] - range[0],
             effort: rms(&efforts),
             largest_effort: largest(&efforts),
@@ -150,7 +156,10 @@ impl Scales {
                 times(&[1.5, 3.0, 6.0, 12.0, 25.0], self.step_s.max(0.1 / self.cutoff_hz))
             }
             "s" => times(&[0.05, 0.1, 0.2, 0.4, 0.8], self.seconds),
-            "rad/s" | "m/s" => times(&[0.05, 0.1, 0.2, 0.4], self.speed),
+            "rad/s" | "m/s" => {
+                let scales: Vec<f64> = times(&[0.05, 0.1, 0.2, 0.4], self.speed);
+                scales.into_iter().filter(|scale| *scale >= self.slowest).collect()
+            }
             "rad" | "m" if kind.place == Place::Actuator => times(&[0.003, 0.01, 0.03], self.speed),
             "rad" | "m" => times(&[0.001, 0.003, 0.01, 0.03], self.speed),
             "N m" | "N" if kind.id.contains("saturation") => {
@@ -175,9 +184,19 @@ impl Scales {
             // Less than a row is the sampling's own.
             "command_delay" | "actuator_lag" => [self.step_s, 2.0 * high],
             "torque_saturation" => [0.5 * low, self.largest_effort],
+            _ if matches!(parameter.unit(machine), "rad/s" | "m/s") => {
+                [self.slowest.max(0.25 * low), 4.0 * high]
+            }
             _ => [0.25 * low, 4.0 * high],
         }
     }
+}
+
+/// What a twentieth of some values is below.
+fn lowest_twentieth(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 20).copied().unwrap_or(0.0)
 }
 
 /// Candidates at the grid of their shapes; not those whose shapes are harmonics.

@@ -15,10 +15,16 @@ const RIGHT_UNIT: [f64; 2] = [0.5, 2.0];
 const COHERENT: f64 = 0.6;
 /// The same where the column of the speed is off by that factor too.
 const COHERENT_WITH_GEAR: f64 = 0.3;
+/// The same of the whole effort, where nothing but it says that the factor is wrong.
+const COHERENT_ALONE: f64 = 0.8;
 /// Degrees in a radian, 1/s of a rev/min, and powers of ten: factors of a unit and of no gear.
 const UNITS: [f64; 5] = [57.296, 9.549, 10.0, 100.0, 1000.0];
 /// Share of rows at a limit above which an effort is cut off.
 const CUT_OFF: f64 = 0.2;
+/// Share of a log for which a position stands still, and of the width of the effort elsewhere that it then has, from
+/// which on the sensor is dead.
+const DEAD: f64 = 0.2;
+const AS_BEFORE: f64 = 0.8;
 /// Runs of equal values that are usual, from which on a column is held.
 const HELD_ROWS: usize = 3;
 
@@ -65,6 +71,17 @@ pub(super) fn check<'a>(logs: impl IntoIterator<Item = &'a Log>, declared: &Decl
             }
         }
         let efforts = column(names.effort);
+        found.extend(dead_part(column("time_s"), column(names.position), efforts).map(|[from_s, to_s]| {
+            finding(
+                Severity::Error,
+                names.position,
+                format!(
+                    "the value stays the same from {from_s:.1} to {to_s:.1} s while the effort goes on as before: the sensor \
+                     is dead there"
+                ),
+                "check the sensor and its cable, or cut the log to the part before",
+            )
+        }));
         let share = share_at_limits(efforts);
         if share > CUT_OFF {
             found.push(finding(
@@ -79,6 +96,28 @@ pub(super) fn check<'a>(logs: impl IntoIterator<Item = &'a Log>, declared: &Decl
         }
     }
     found
+}
+
+/// Times, in s, between which a position stands still though the effort does there what it does elsewhere.
+fn dead_part(time_s: &[f64], position: &[f64], effort: &[f64]) -> Option<[f64; 2]> {
+    let mut start = 0;
+    let runs = position.chunk_by(|a, b| a == b).map(|run| {
+        start += run.len();
+        start - run.len()..start
+    });
+    let longest = runs.max_by_key(ExactSizeIterator::len)?;
+    let all = position.len();
+    if (longest.len() as f64) < DEAD * all as f64 || longest.len() == all || effort.len() != all {
+        return None;
+    }
+    let width = |values: &mut dyn Iterator<Item = &f64>| {
+        let [low, high] =
+            values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &v| [low.min(v), high.max(v)]);
+        high - low
+    };
+    let inside = width(&mut effort[longest.clone()].iter());
+    let outside = width(&mut effort[..longest.start].iter().chain(&effort[longest.end..]));
+    (inside > AS_BEFORE * outside).then(|| [time_s[longest.start], time_s[longest.end - 1]])
 }
 
 /// The finding that the motion does not tell the parameters apart.
@@ -152,11 +191,15 @@ pub(super) fn check_rows(
     found
 }
 
+/// Whether a factor is that of a unit.
+fn is_unit(ratio: f64) -> bool {
+    UNITS.iter().any(|unit| (ratio.abs().ln().abs() - unit.ln()).abs() < 0.03)
+}
+
 /// The finding that the column of the speed is that of a motor before a gear, and so is the effort beside it.
 fn before_a_gear(rows: &Rows, declared: &Declared) -> Option<HealthFinding> {
     let ratio = rows.agreement.filter(|speed| speed.incoherent < 0.5)?.factor;
-    let is_unit = |unit: &f64| (ratio.abs().ln().abs() - unit.ln()).abs() < 0.03;
-    if (RIGHT_UNIT[0]..=RIGHT_UNIT[1]).contains(&ratio) || UNITS.iter().any(is_unit) {
+    if (RIGHT_UNIT[0]..=RIGHT_UNIT[1]).contains(&ratio) || is_unit(ratio) {
         return None;
     }
     let names = declared.names();
@@ -212,8 +255,12 @@ pub(super) fn check_effort(
         .map(|speed| speed.factor)
         .filter(|speed| (speed * factor.abs()).ln().abs() < 0.3 || (speed / factor.abs()).ln().abs() < 0.3)
         .filter(|speed| !(RIGHT_UNIT[0]..=RIGHT_UNIT[1]).contains(speed));
+    // Beside numbers that are free, a factor that is no unit's and that the speed does not share may be the declared part
+    // that is wrong.
+    let alone = members.len() > 1 && gear.is_none() && !is_unit(factor) && rows.agreement.is_some();
     let needed = if gear.is_some() { COHERENT_WITH_GEAR } else { COHERENT };
-    if explained < needed * (explained + left) || explained < needed * 0.5 * blocks.target_power() {
+    let of_all = if alone { COHERENT_ALONE } else { 0.5 * needed };
+    if explained < needed * (explained + left) || explained < of_all * blocks.target_power() {
         return before_a_gear(rows, declared).into_iter().collect();
     }
     if factor < 0.0 {

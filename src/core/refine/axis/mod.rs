@@ -21,14 +21,17 @@ use crate::record::Log;
 use crate::robot::Motor;
 
 use super::error::RefineError;
+use super::gain::Gain;
+use super::select::Blocks;
 use super::verdict::{Corrected, Found, Refinement, Residual, Unexplained, Verdict};
+use super::whiten::Whitener;
 use super::{Explorer, Options};
 use candidates::{Scales, library};
 use errors::errors;
 use floor::Floor;
 use leftover::{Dependence, Variable};
 use rig::{Declared, Nuisance};
-use search::{Fit, Search, White};
+use search::{Fit, Held, Search, White};
 use trace::{Part, Rows};
 
 /// Share of the gain of effects above which what is left shows that they are not the right ones.
@@ -37,6 +40,8 @@ const MISNAMED: f64 = 0.35;
 const NEARLY_ALL: f64 = 0.8;
 /// How many times its noise floor an error is at least that something of it is not explained.
 const OVER_FLOOR: f64 = 1.25;
+/// The same where the floor is that of the sensors alone, which leaves out what nobody measures.
+const OVER_SENSORS: f64 = 2.0;
 /// How many times its floor an error may stay, and the share of what was above the floor that effects then have to explain.
 const FAR_OVER_FLOOR: f64 = 1.4;
 const LITTLE: f64 = 0.5;
@@ -62,13 +67,14 @@ pub(super) fn residual(
 ) -> Result<Residual, RefineError> {
     let declared = Declared::new(model, options.motor);
     let mut data_health = health::check(logs, &declared);
-    // Nothing is fitted, so that every row counts.
+    // No number is fitted, so that every row counts.
     let rows = Rows::new(logs, logs, declared.names());
-    let [measured, target] = declared.targets(&rows);
+    let [measured, mut target] = declared.targets(&rows);
     let nuisances = declared.nuisances(&rows, &options.estimate)?;
     data_health.extend(health::check_effort(&rows, &declared, &nuisances, &measured, &target));
     report(watch, 0.5)?;
     let whitener = search::whitener(&rows, declared.inertia);
+    take_out_timing(&nuisances, &whitener, &mut target);
     let mut tests = Vec::new();
     if whitener.rows().len() >= LEAST_ROWS {
         let white = White::new(&rows, &whitener, &nuisances, [&measured, &target], declared.inertia);
@@ -78,6 +84,17 @@ pub(super) fn residual(
     }
     let floor = Floor::new(&declared, &rows, Part::HeldOut, &target);
     Ok(Residual { errors: errors(&declared, &rows, &measured, &target, &floor), tests, data_health })
+}
+
+/// Takes the timing of the torque out of a residual, which is the log's and of no model.
+fn take_out_timing(nuisances: &[Nuisance], whitener: &Whitener, target: &mut [f64]) {
+    let Some(timing) = nuisances.iter().find(|nuisance| nuisance.is_timing()) else { return };
+    let (column, white) = (whitener.apply(&timing.column), whitener.apply(target));
+    let blocks = Blocks::new(&[&column], &white, &vec![0; white.len()]);
+    let noise = blocks.target_power() / blocks.rows().max(1) as f64;
+    if let Some(late) = blocks.fit(&[timing.member(0)], noise) {
+        target.iter_mut().zip(&timing.column).for_each(|(target, value)| *target -= late[0] * value);
+    }
 }
 
 fn report(watch: &mut dyn FnMut(f64) -> ControlFlow<()>, share: f64) -> Result<(), RefineError> {
@@ -125,7 +142,7 @@ pub(super) fn refine(
     let before_structure = search.leftover(&wanted).unwrap_or_default();
     report(watch, 0.2)?;
     let corrected: Vec<(&'static str, f64)> =
-        corrections(&declared, &nuisances, &first).iter().map(|c| (c.key, c.value)).collect();
+        corrections(&declared, &nuisances, &first, &[]).iter().map(|c| (c.key, c.value)).collect();
     let clean = null::Clean {
         inertia: declared.inertia,
         curve: declared.corrected_curve(&corrected),
@@ -135,13 +152,19 @@ pub(super) fn refine(
     search.thresholds = null::thresholds(&clean, &rows, &whitener, &search, &library);
     report(watch, 0.4)?;
     search.run(watch)?;
+    search.settle();
+    search.hold_untold();
+    search.check_held_out();
+    search.release_needed();
+    if search.picks.is_empty() {
+        search.held.clear();
+    }
     let held_out_error = |left: &[f64]| errors::rms(&rows, Part::HeldOut, left);
-    search.check_held_out(&held_out_error);
     report(watch, 0.8)?;
     let mut structure = search.leftover(&wanted).unwrap_or_default();
     structure.retain(Dependence::shows);
     let mut fit = search.fit(&[]).unwrap_or_else(|| first.clone());
-    let mut effects = found_effects(&search, &fit, &declared, &held_out_error);
+    let mut effects = found_effects(&search, &fit, &declared);
     let left = search.residual(&fit.judged.coefficients);
     let floor = Floor::new(&declared, &rows, Part::HeldOut, &left);
     let wrong = !effects.is_empty()
@@ -150,14 +173,16 @@ pub(super) fn refine(
     if wrong {
         (effects, fit) = (Vec::new(), first);
         search.picks.clear();
+        search.held.clear();
     }
     let left = search.residual(&fit.judged.coefficients);
     let floor = Floor::new(&declared, &rows, Part::HeldOut, &left);
     let before = errors(&declared, &rows, &measured, &before_left, &floor);
     let after = errors(&declared, &rows, &measured, &left, &floor);
     let over_floor = held_out_error(&left) / floor.variance.sqrt();
-    let over_floor = (floor.measured && over_floor > OVER_FLOOR).then_some(over_floor);
-    let corrections = corrections(&declared, &nuisances, &fit);
+    let most = if floor.measured { OVER_FLOOR } else { OVER_SENSORS };
+    let over_floor = (over_floor > most).then_some(over_floor);
+    let corrections = corrections(&declared, &nuisances, &fit, &search.held);
     let structure = if wrong && structure.is_empty() {
         before_structure.into_iter().filter(Dependence::shows).collect()
     } else {
@@ -302,28 +327,25 @@ fn unexplained(declared: &Declared, structure: &[Dependence], over_floor: Option
     Unexplained { depends_on, shares, description }
 }
 
-fn corrections(declared: &Declared, nuisances: &[Nuisance], fit: &Fit) -> Vec<Corrected> {
+fn corrections(declared: &Declared, nuisances: &[Nuisance], fit: &Fit, held: &[Held]) -> Vec<Corrected> {
     let t = student_t_975(fit.blocks.count().max(2) - 1);
     let corrected = |(index, nuisance): (usize, &Nuisance)| {
         let change = fit.judged.coefficients[index];
         let width = t * fit.judged.standard_error(index);
+        let own = held.iter().find(|held| held.nuisance == index);
+        let ends = own.map_or([change - width, change + width], |held| held.ci95);
         Corrected {
             key: nuisance.key,
             declared: declared.in_file(nuisance),
             value: nuisance.corrected(change),
-            ci95: Some([nuisance.corrected(change - width), nuisance.corrected(change + width)]),
+            ci95: Some(ends.map(|end| nuisance.corrected(end))),
         }
     };
     nuisances.iter().enumerate().filter(|(_, nuisance)| !nuisance.key.is_empty()).map(corrected).collect()
 }
 
 /// Picks of one kind are one effect, the strongest harmonics first.
-fn found_effects(
-    search: &Search<'_>,
-    fit: &Fit,
-    declared: &Declared,
-    error: &dyn Fn(&[f64]) -> f64,
-) -> Vec<Found> {
+fn found_effects(search: &Search<'_>, fit: &Fit, declared: &Declared) -> Vec<Found> {
     let t = student_t_975(fit.blocks.count().max(2) - 1);
     let mut first = search.nuisances.len();
     let mut firsts = Vec::new();
@@ -332,6 +354,7 @@ fn found_effects(
         first += pick.columns.len();
     }
     let all = search.residual(&fit.judged.coefficients);
+    let held_out: Vec<bool> = search.rows.rows.iter().map(|row| row.part == Part::HeldOut).collect();
     let mut found: Vec<Found> = Vec::new();
     for (index, pick) in search.picks.iter().enumerate() {
         if found.iter().any(|found| found.effect.kind() == pick.kind) {
@@ -380,7 +403,7 @@ fn found_effects(
         let units = (0..effect.parameters().len())
             .map(|n| parameters[n % parameters.len()].unit(declared.machine.kind))
             .collect();
-        let drop = 1.0 - error(&all) / search.error_without(&members, error).unwrap_or(f64::NAN);
+        let gain = search.residual_without(&members).and_then(|without| Gain::new(&without, &all, &held_out));
         let mut ambiguous_with = Vec::new();
         for &member in &members {
             for kind in search.ambiguous_with(member, fit) {
@@ -389,8 +412,16 @@ fn found_effects(
                 }
             }
         }
-        found.push(Found { effect, ci95, units, error_drop_percent: 100.0 * drop, ambiguous_with });
+        found.push(Found {
+            effect,
+            ci95,
+            units,
+            error_drop_percent: gain.map_or(f64::NAN, |gain| 100.0 * gain.share),
+            error_drop_ci95: gain.map(|gain| gain.ci95.map(|share| 100.0 * share)),
+            ambiguous_with,
+        });
     }
+    found.sort_by(|a, b| b.error_drop_percent.total_cmp(&a.error_drop_percent));
     found
 }
 

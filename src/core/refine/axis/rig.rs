@@ -19,6 +19,8 @@ const STRIBECK_OF_FASTEST: f64 = 0.5;
 const FREE_INERTIA: [f64; 2] = [-0.99, 99.0];
 /// Largest share of the acceleration's power that is taken for noise.
 const MOST_NOISE: f64 = 0.5;
+/// In the place of an effect: when the torque acts.
+const TIMING: &str = "timing";
 /// A sampled torque may act anywhere between its own row and the next.
 const TIMING_ROWS: f64 = 0.5;
 
@@ -49,6 +51,11 @@ pub(super) struct Nuisance {
 }
 
 impl Nuisance {
+    /// Whether it is the timing of the torque.
+    pub(super) fn is_timing(&self) -> bool {
+        self.effect == TIMING
+    }
+
     pub(super) fn member(&self, column: usize) -> Member {
         match (self.free, self.effect) {
             (false, _) => Member::within(column, self.tolerance),
@@ -155,14 +162,7 @@ impl Declared {
     }
 
     fn curve(&self) -> StribeckParameters {
-        self.friction.unwrap_or(StribeckParameters {
-            coulomb_nm: 0.0,
-            static_nm: 0.0,
-            viscous_nm_s_rad: 0.0,
-            stribeck_speed_rad_s: 1.0,
-            stribeck_exponent: 1.0,
-            offset_nm: 0.0,
-        })
+        self.friction.unwrap_or(StribeckParameters::NONE)
     }
 
     /// Efforts at the rows: measured, and measured less what the declared numbers explain.
@@ -229,8 +229,11 @@ impl Declared {
             return Err(RefineError::UnknownParameter { name: name.clone(), allowed });
         }
         let all = estimate.iter().any(|name| name == "all");
-        let free =
+        let asked =
             |index: usize| (all && index <= place::OFFSET) || estimate.iter().any(|name| name == keys[index]);
+        // One way, both are the same constant: the offset stays as it is declared.
+        let told_apart = rows.both_ways() || !asked(place::COULOMB);
+        let free = |index: usize| asked(index) && (index != place::OFFSET || told_apart);
         let share = |index: usize| self.tolerances.share_of(keys[index]);
         let mut found = Vec::new();
         let mut add = |index: usize, declared: f64, tolerance: f64, effect, column: Vec<f64>| {
@@ -340,7 +343,7 @@ impl Declared {
             column: rows.column(torque_rate),
             tolerance: TIMING_ROWS * rows.kernel.step_s,
             free: false,
-            effect: "",
+            effect: TIMING,
         });
         Ok(found)
     }

@@ -7,6 +7,7 @@ use crate::identify::filter::{ZeroPhase, derivative};
 use crate::identify::motion::kinematics::{Stretch, stretches, white_noise};
 use crate::record::Log;
 use crate::refine::select::{Blocks, Member};
+use crate::refine::split::split_s;
 
 /// Highest cut-off of the kernel, Hz.
 const HIGHEST_CUTOFF_HZ: f64 = 100.0;
@@ -16,10 +17,9 @@ const NOISE_SHARE: f64 = 0.05;
 const ROWS_A_PERIOD: f64 = 2.5;
 /// A speed below this share of the root mean square may be a rest.
 const REST_SHARE: f64 = 0.03;
-/// Share of rows in one direction below which motion goes the other way alone.
-const ONE_WAY: f64 = 0.05;
-/// Between the part that is fitted and the part that is held out, s.
-const HELD_OUT_GAP_S: f64 = 0.5;
+/// Share of rows in one direction below which motion goes the other way alone: the few moments of a reversal, where
+/// friction sticks, do not tell the two directions apart.
+const ONE_WAY: f64 = 0.15;
 /// Periods of the cut-off that are left out at the ends of a stretch.
 const END_PERIODS: f64 = 5.0;
 
@@ -171,11 +171,11 @@ impl Rows {
         for stretches in fitted {
             let end_s = stretches.last().map_or(0.0, end_s);
             let start_s = stretches.first().map_or(0.0, |stretch| stretch.start_s);
-            let cut_s = (2.0 * (end_s - start_s) / 3.0, 2.0 * (end_s - start_s) / 3.0 + HELD_OUT_GAP_S);
+            let [last_s, first_s] = split_s(end_s - start_s);
             let part = |time_s: f64| match time_s {
                 _ if !held_out.is_empty() => Some(Part::Fit),
-                time_s if time_s < cut_s.0 => Some(Part::Fit),
-                time_s if time_s >= cut_s.1 => Some(Part::HeldOut),
+                time_s if time_s < last_s => Some(Part::Fit),
+                time_s if time_s >= first_s => Some(Part::HeldOut),
                 _ => None,
             };
             let counts = found.add(stretches, start_s, part);

@@ -148,6 +148,7 @@ pub(super) fn effects(search: &Search<'_>, picks: &[Candidate], fit: &Fit, fitte
             ci95,
             units,
             error_drop_percent: 100.0 * (1.0 - with / without),
+            error_drop_ci95: None,
             ambiguous_with,
         });
     }
@@ -250,6 +251,7 @@ pub(super) fn gyro_bias(logs: &[Readings], held_out: &[Readings]) -> Option<Foun
         ci95: vec![Some([mean - width, mean + width])],
         units: kind.parameters.iter().map(|parameter| parameter.unit(MachineKind::Robot)).collect(),
         error_drop_percent: 100.0 * drop,
+        error_drop_ci95: None,
         ambiguous_with: Vec::new(),
     })
 }

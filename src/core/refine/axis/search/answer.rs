@@ -63,17 +63,13 @@ impl Search<'_> {
         found
     }
 
-    /// Error on the held-out rows of a fit without some picks.
-    pub(in super::super) fn error_without(
-        &self,
-        out: &[usize],
-        error: &dyn Fn(&[f64]) -> f64,
-    ) -> Option<f64> {
+    /// What a fit without some picks leaves, at all rows.
+    pub(in super::super) fn residual_without(&self, out: &[usize]) -> Option<Vec<f64>> {
         let kept =
             (0..self.picks.len()).filter(|i| !out.contains(i)).map(|i| self.picks[i].clone()).collect();
         let trial = self.with_picks(kept);
         let fit = trial.fit(&[])?;
-        Some(error(&trial.residual(&fit.judged.coefficients)))
+        Some(trial.residual(&fit.judged.coefficients))
     }
 
     /// What the residual still depends on.

@@ -30,6 +30,8 @@ pub(super) struct Search<'a> {
     pub(super) scales: Scales,
     /// What was found, in order of evidence.
     pub(super) picks: Vec<Candidate>,
+    /// Free numbers that stay as declared, because the log does not tell them from that.
+    pub(super) held: Vec<Held>,
     /// Kinds whose best shape is none that the log could show.
     banned: Vec<&'static EffectKind>,
     /// The best of each kind alone, as the first step saw them.
@@ -38,6 +40,15 @@ pub(super) struct Search<'a> {
     whitener: &'a Whitener,
     white: &'a White,
     library: &'a [Candidate],
+}
+
+/// A free number that stays as declared.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Held {
+    /// Place among the nuisances.
+    pub(super) nuisance: usize,
+    /// 95 % interval of its change, as the log alone has it.
+    pub(super) ci95: [f64; 2],
 }
 
 /// What stays the same throughout a search.
@@ -123,6 +134,7 @@ impl<'a> Search<'a> {
             target,
             scales,
             picks: Vec::new(),
+            held: Vec::new(),
             banned: Vec::new(),
             alone: Vec::new(),
             thresholds: Thresholds::default(),
@@ -195,7 +207,12 @@ impl<'a> Search<'a> {
         let said = |nuisance: &Nuisance| chosen.iter().any(|(pick, _)| pick.kind.id == nuisance.effect);
         let nuisances = self.nuisances.iter().enumerate().map(|(column, nuisance)| {
             let member = nuisance.member(column);
-            if said(nuisance) { Member { bounds: [0.0, 0.0], spread: 1e-12, ..member } } else { member }
+            let held = self.held.iter().any(|held| held.nuisance == column);
+            if held || said(nuisance) {
+                Member { bounds: [0.0, 0.0], spread: 1e-12, ..member }
+            } else {
+                member
+            }
         });
         let picks = chosen.iter().flat_map(|(pick, first)| {
             let mut members = pick.members(*first, self.machine.kind, searched);
@@ -278,6 +295,13 @@ impl<'a> Search<'a> {
     }
 
     fn with_picks(&self, picks: Vec<Candidate>) -> Self {
-        Self { picks, banned: Vec::new(), alone: Vec::new(), scales: self.scales.clone(), ..*self }
+        Self {
+            picks,
+            held: self.held.clone(),
+            banned: Vec::new(),
+            alone: Vec::new(),
+            scales: self.scales.clone(),
+            ..*self
+        }
     }
 }

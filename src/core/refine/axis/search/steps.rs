@@ -3,12 +3,16 @@
 use std::ops::ControlFlow;
 
 use crate::effects::EffectKind;
+use crate::identify::quantile::student_t_975;
 use crate::refine::error::RefineError;
+use crate::refine::gain::Gain;
 use crate::refine::select::{Blocks, Judged, Member};
 
 use super::super::candidates::Candidate;
+use super::super::rig::Nuisance;
+use super::super::trace::Part;
 use super::super::waves;
-use super::{Fit, Search};
+use super::{Fit, Held, Search};
 
 /// Share by which an effect must lower the error on left-out blocks.
 const LEAST_GAIN: f64 = 0.006;
@@ -33,6 +37,8 @@ const PREFERRED: [&str; 8] = [
     "friction_asymmetry",
     "command_delay",
 ];
+/// Half of the interval of a free number, as a share of it, above which the log hardly tells it.
+const VAGUE: f64 = 0.25;
 /// Share of a candidate's power that the declared numbers must leave for it to be testable.
 const OWN_POWER: f64 = 0.05;
 
@@ -324,16 +330,73 @@ impl Search<'_> {
         }
     }
 
-    /// Takes out whatever makes the error on the held-out rows larger, the worst first.
-    pub(in super::super) fn check_held_out(&mut self, error: &dyn Fn(&[f64]) -> f64) -> Option<()> {
+    /// Takes out picks without which the held-out rows are told as well, the most doubtful first: the interval of what
+    /// each gains there must not hold 0.
+    pub(in super::super) fn check_held_out(&mut self) -> Option<()> {
+        let held_out: Vec<bool> = self.rows.rows.iter().map(|row| row.part == Part::HeldOut).collect();
         while !self.picks.is_empty() {
-            let with = error(&self.residual(&self.fit(&[])?.judged.coefficients));
-            let harm = |out: usize| Some((with - self.error_without(&[out], error)?, out));
-            let worst = (0..self.picks.len()).filter_map(harm).max_by(|a, b| a.0.total_cmp(&b.0))?;
-            if worst.0 < 0.0 {
+            let with = self.residual(&self.fit(&[])?.judged.coefficients);
+            let least = |out: usize| {
+                let gain = Gain::new(&self.residual_without(&[out])?, &with, &held_out)?;
+                Some((gain.ci95[0], out))
+            };
+            let weakest = (0..self.picks.len()).filter_map(least).min_by(|a, b| a.0.total_cmp(&b.0))?;
+            if weakest.0 > 0.0 {
                 break;
             }
-            self.picks.remove(worst.1);
+            self.picks.remove(weakest.1);
+        }
+        Some(())
+    }
+
+    /// Drops the last picks until the rest can be fitted, so that the answer is that of a fit.
+    pub(in super::super) fn settle(&mut self) {
+        while !self.picks.is_empty() && self.fit(&[]).is_none() {
+            self.picks.pop();
+        }
+    }
+
+    /// Keeps free numbers as declared that the log does not tell from that, the least sure first: a number that is off
+    /// by chance would carry the model away on other logs.
+    pub(in super::super) fn hold_untold(&mut self) -> Option<()> {
+        let mut needed: Vec<usize> = Vec::new();
+        loop {
+            let fit = self.fit(&[])?;
+            let t = student_t_975(fit.blocks.count().max(2) - 1);
+            let untold = |(index, nuisance): (usize, &Nuisance)| {
+                let known = nuisance.effect == "inertia_error" || nuisance.key.is_empty() || !nuisance.free;
+                let seen = needed.contains(&index) || self.held.iter().any(|held| held.nuisance == index);
+                if known || seen {
+                    return None;
+                }
+                let (change, width) = (fit.judged.coefficients[index], t * fit.judged.standard_error(index));
+                let value = (nuisance.declared + change).abs();
+                let vague = width > VAGUE * value && change.abs() <= width;
+                vague.then_some((
+                    width / value,
+                    Held { nuisance: index, ci95: [change - width, change + width] },
+                ))
+            };
+            let found = self.nuisances.iter().enumerate().filter_map(untold);
+            let Some((_, held)) = found.max_by(|a, b| a.0.total_cmp(&b.0)) else { return Some(()) };
+            self.held.push(held);
+            // What the others cannot take over is told after all.
+            let without = self.fit(&[]);
+            if without.is_none_or(|without| fit.judged.gain_over(&without.judged) > LEAST_GAIN) {
+                self.held.pop();
+                needed.push(held.nuisance);
+            }
+        }
+    }
+
+    /// Lets go of numbers that were kept as declared and are needed now that picks are gone.
+    pub(in super::super) fn release_needed(&mut self) -> Option<()> {
+        for place in (0..self.held.len()).rev() {
+            let kept = self.fit(&[])?;
+            let held = self.held.remove(place);
+            if self.fit(&[]).is_none_or(|free| free.judged.gain_over(&kept.judged) <= LEAST_GAIN) {
+                self.held.insert(place, held);
+            }
         }
         Some(())
     }
