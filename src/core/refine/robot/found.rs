@@ -75,6 +75,18 @@ fn as_declared(
     }
 }
 
+/// The place of the pick whose size is least sure, where its 95 % interval has 0 in it.
+pub(super) fn unsure(search: &Search<'_>, fit: &Fit) -> Option<usize> {
+    let t = student_t_975(fit.blocks.count().max(2) - 1);
+    let uncertainty = Uncertainty::new(search, &search.picks, fit);
+    let z = |(pick, first): (&Candidate, usize)| {
+        let own = first..first + pick.white.len();
+        own.map(|i| (fit.judged.coefficients[i] / uncertainty.sizes[i]).powi(2)).sum::<f64>().sqrt()
+    };
+    let of_picks = search.placed(&search.picks).into_iter().map(z).enumerate();
+    of_picks.filter(|(_, z)| *z <= t).min_by(|a, b| a.1.total_cmp(&b.1)).map(|(place, _)| place)
+}
+
 /// The picks as effects, harmonics of one kind together: their sizes from `fit`, the errors with them from `fitted`, which
 /// is as the log alone has it.
 pub(super) fn effects(search: &Search<'_>, picks: &[Candidate], fit: &Fit, fitted: &Fit) -> Vec<Found> {

@@ -171,9 +171,14 @@ pub(super) fn refine(
             search.confirm();
         }
         let Some(fit) = search.fit(&search.picks) else { return Ok(Refinement::unfit(model, data_health)) };
-        let last = pass == 1 || search.picks.is_empty();
-        if last {
-            return Ok(answer(model, &search, &fit, (bias, known, options.seed), data_health));
+        if search.picks.is_empty() {
+            return Ok(answer(model, &search, (&fit, &fit), bias, data_health));
+        }
+        if pass == 1 {
+            let Some((fit, sized)) = sure(&mut search, known, options.seed) else {
+                return Ok(Refinement::unfit(model, data_health));
+            };
+            return Ok(answer(model, &search, (&fit, &sized), bias, data_health));
         }
         let left = search.left_raw(&search.picks, &fit.judged.coefficients);
         let loads = trace.loads(&found::laws(&search, &fit));
@@ -211,6 +216,19 @@ fn by_chance(
         .map_or(0.0, |(twin, levels)| chance::largest_gain(&twin, levels, seed))
 }
 
+/// The fit of the picks whose size is surely not 0, as it is and with sizes that the chain has nothing added to; the others
+/// are dropped, one by one.
+fn sure(search: &mut Search<'_>, known: Known<'_>, seed: u64) -> Option<(Fit, Fit)> {
+    loop {
+        let fit = search.fit(&search.picks)?;
+        let sized = unbiased(search, fit.clone(), known, seed);
+        match found::unsure(search, &sized) {
+            Some(place) => search.picks.remove(place),
+            None => return Some((fit, sized)),
+        };
+    }
+}
+
 /// Takes off what the chain itself adds to the sizes.
 fn unbiased(search: &Search<'_>, mut fit: Fit, known: Known<'_>, seed: u64) -> Fit {
     let is_simulated = |pick: &candidates::Candidate| pick.form == Form::Law && !pick.kind.trial.brief;
@@ -240,8 +258,8 @@ fn check_names(names: &[String]) -> Result<(), RefineError> {
 fn answer(
     model: &Model,
     search: &Search<'_>,
-    fit: &Fit,
-    (bias, known, seed): (Option<Found>, Known<'_>, u64),
+    (fit, sized): (&Fit, &Fit),
+    bias: Option<Found>,
     data_health: Vec<HealthFinding>,
 ) -> Refinement {
     let trace = search.trace;
@@ -263,8 +281,8 @@ fn answer(
         || !is_refuted && (share > EXPLAINED || leftover < LITTLE && share > MOST_OF_IT);
     let picks = if explained { search.picks.as_slice() } else { &[] };
     let used = if explained { fit } else { bare };
-    let sized = if picks.is_empty() { used.clone() } else { unbiased(search, used.clone(), known, seed) };
-    let mut effects = found::effects(search, picks, &sized, used);
+    let sized = if picks.is_empty() { used } else { sized };
+    let mut effects = found::effects(search, picks, sized, used);
     effects.extend(bias);
     let residual =
         |picks: &[candidates::Candidate], fit: &Fit| search.left_raw(picks, &fit.judged.coefficients);

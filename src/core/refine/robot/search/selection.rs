@@ -38,6 +38,9 @@ const HANDICAP: [f64; 2] = [3.0, 10.0];
 /// Gain in units of the least one up to which clean robots are asked what chance does.
 const DOUBT: f64 = 3.0;
 
+/// Share of the power that effects explain of which their sizes and shapes, right to a few percent, may leave as much.
+const LEFT_OF_FOUND: f64 = 1e-3;
+
 /// What a candidate costs against a rival that does as well.
 fn handicap(pick: &Candidate) -> f64 {
     HANDICAP[0] * pick.parameters() as f64 + HANDICAP[1] * (pick.kind.trial.caution - 1.0)
@@ -107,9 +110,11 @@ impl Search<'_> {
         is_sure && (is_plain && beyond > DOUBT || beyond > (self.by_chance)())
     }
 
-    /// Drops picks that are not far beyond what chance does and do not lower the error on rows that no fit has seen, and
-    /// those that raise the error on held-out rows.
+    /// Drops picks that are not far beyond what chance does and do not lower the error on rows that no fit has seen,
+    /// those that raise the error on held-out rows, and those that explain no more than what a size that is a little
+    /// wrong leaves of the others.
     pub(in crate::refine::robot) fn confirm(&mut self) {
+        let Some(bare) = self.fit(&[]) else { return };
         let mut place = 0;
         while place < self.picks.len() {
             let mut others = self.picks.clone();
@@ -122,13 +127,25 @@ impl Search<'_> {
             };
             let is_weak = gain < DOUBT * self.least_of(pick.kind, without.score)
                 && unseen(&self.picks, &with) >= unseen(&others, &without);
-            let harms = held_out_error(self, &self.picks, &with) >= held_out_error(self, &others, &without);
-            if !pick.kind.trial.brief && (is_weak || harms) {
+            let held_out = |picks: &[Candidate], fit: &Fit| held_out_error(self, picks, fit).powi(2);
+            let [held_bare, held_without, held_with] =
+                [held_out(&[], &bare), held_out(&others, &without), held_out(&self.picks, &with)];
+            let gains_little = held_without - held_with <= LEFT_OF_FOUND * (held_bare - held_with).max(0.0);
+            let is_left = gain < LEFT_OF_FOUND * (bare.score - with.score);
+            if is_left || self.is_stuck(&pick, &others) || !pick.kind.trial.brief && (is_weak || gains_little)
+            {
                 self.picks = others;
             } else {
                 place += 1;
             }
         }
+    }
+
+    /// Whether a pick whose size is in its shape stays at its bound without every block: the shape never came to where
+    /// the log has it.
+    fn is_stuck(&self, pick: &Candidate, others: &[Candidate]) -> bool {
+        let picks = [others, std::slice::from_ref(pick)].concat();
+        pick.is_sized() && self.fit(&picks).is_some_and(|fit| self.z(pick, &fit).is_infinite())
     }
 
     /// Of pushes next to each other keeps the strongest where the others only mend its shape, and none where one push
