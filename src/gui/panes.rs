@@ -63,21 +63,26 @@ pub(crate) fn panes_ui<K: Copy>(
     }
     let widths: Vec<f32> = panes.iter().map(|pane| pane.width).collect();
     let room = ui.available_width();
-    if in_view(&widths, front, room).contains(&false) {
-        Panel::top((page, "panes")).frame(side).show(ui, |ui| {
-            ui.horizontal_wrapped(|ui| {
-                let shown = in_view(&widths, front, room);
-                for (index, pane) in panes.iter().enumerate() {
-                    let name = ui.selectable_label(shown[index], pane.name);
-                    if name.on_hover_text("There is no room for all panes of this page").clicked() {
-                        front = index;
-                        ui.data_mut(|data| data.insert_temp(id, front));
-                    }
-                }
-            });
+    let mut shown = in_view(&widths, front, room);
+    if shown.contains(&false) {
+        let chosen = Panel::top((page, "panes")).frame(side).show(ui, |ui| {
+            let names = |ui: &mut Ui| {
+                let clicked = |(pane, shown): (&Pane<K>, &bool)| {
+                    let name = ui.selectable_label(*shown, pane.name);
+                    name.on_hover_text("There is no room for all panes of this page").clicked()
+                };
+                // All of them are drawn before one is chosen.
+                let clicks: Vec<bool> = panes.iter().zip(&shown).map(clicked).collect();
+                clicks.into_iter().position(|clicked| clicked)
+            };
+            ui.horizontal_wrapped(names).inner
         });
+        if let Some(chosen) = chosen.inner {
+            front = chosen;
+            ui.data_mut(|data| data.insert_temp(id, front));
+            shown = in_view(&widths, front, room);
+        }
     }
-    let shown = in_view(&widths, front, room);
     let filling = if shown.get(middle) == Some(&true) { middle } else { front };
     for (index, pane) in panes.iter().enumerate() {
         let id = (page, pane.name);

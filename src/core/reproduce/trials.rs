@@ -120,24 +120,9 @@ fn exact_sensors(robot: &mut RobotModel) {
 }
 
 fn ideal(robot: &mut RobotModel) {
-    // Whole literals, so that an imperfection that is added later cannot be forgotten here.
     robot.actuation = Actuation { delay_s: 0.0, torque_noise_nm: 0.0, torque_step_nm: 0.0 };
     robot.limits = MotorLimits::default();
-    robot.sensors = SensorSettings {
-        encoder_bits: 0,
-        motor_rate_hz: 1000.0,
-        motor_speed_step_rad_s: 0.0,
-        motor_speed_noise_rad_s: 0.0,
-        imu_rate_hz: 1000.0,
-        imu_latency_s: 0.0,
-        pitch_step_rad: 0.0,
-        pitch_noise_rad: 0.0,
-        pitch_rate_step_rad_s: 0.0,
-        pitch_rate_noise_rad_s: 0.0,
-        imu_mount_angle_rad: 0.0,
-        gyro_bias_rad_s: 0.0,
-        time_stamp_noise_s: 0.0,
-    };
+    robot.sensors = SensorSettings { imu_rate_hz: 1000.0, ..SensorSettings::default().exact() };
 }
 
 fn without_friction([declared, actual]: [&mut RobotModel; 2]) {

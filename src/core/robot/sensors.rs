@@ -65,6 +65,27 @@ impl Default for SensorSettings {
 }
 
 impl SensorSettings {
+    /// These sensors without noise and without steps, as often, as late and as far off as they are.
+    #[must_use]
+    pub fn exact(self) -> Self {
+        // A whole literal, so that an imperfection that is added later cannot be forgotten here.
+        Self {
+            encoder_bits: 0,
+            motor_rate_hz: self.motor_rate_hz,
+            motor_speed_step_rad_s: 0.0,
+            motor_speed_noise_rad_s: 0.0,
+            imu_rate_hz: self.imu_rate_hz,
+            imu_latency_s: self.imu_latency_s,
+            pitch_step_rad: 0.0,
+            pitch_noise_rad: 0.0,
+            pitch_rate_step_rad_s: 0.0,
+            pitch_rate_noise_rad_s: 0.0,
+            imu_mount_angle_rad: self.imu_mount_angle_rad,
+            gyro_bias_rad_s: self.gyro_bias_rad_s,
+            time_stamp_noise_s: 0.0,
+        }
+    }
+
     /// Step of the motor angles, rad.
     pub fn encoder_step_rad(&self) -> f64 {
         if self.encoder_bits == 0 {

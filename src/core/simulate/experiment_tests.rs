@@ -8,7 +8,7 @@ use nalgebra::Matrix2x4;
 use super::*;
 use crate::identify::Motor;
 use crate::model_file::{Model, Rig, RobotModel, presets};
-use crate::robot::{Actuation, Payload, SensorSettings, Surroundings, Tether};
+use crate::robot::{Actuation, Payload, Surroundings, Tether};
 
 fn ground(experiment: &Experiment, actual: &Model) -> Run {
     match run(experiment, &presets::paper(), actual, &mut |_| ControlFlow::Continue(())).unwrap() {
@@ -94,16 +94,7 @@ fn multisine_moves_a_smooth_robot_at_its_lines_alone() {
     let smooth = changed(|robot| {
         robot.friction = [None; 2];
         robot.actuation = Actuation { torque_noise_nm: 0.0, torque_step_nm: 0.0, ..robot.actuation };
-        robot.sensors = SensorSettings {
-            encoder_bits: 0,
-            motor_speed_step_rad_s: 0.0,
-            motor_speed_noise_rad_s: 0.0,
-            pitch_step_rad: 0.0,
-            pitch_noise_rad: 0.0,
-            pitch_rate_step_rad_s: 0.0,
-            pitch_rate_noise_rad_s: 0.0,
-            ..robot.sensors
-        };
+        robot.sensors = robot.sensors.exact();
     });
     let experiment =
         Experiment { seconds: 40.0, ..Experiment::new(Scenario::Multisine, ControllerChoice::Lqr) };

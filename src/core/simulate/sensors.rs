@@ -118,17 +118,7 @@ mod tests {
 
     /// No steps and no noise.
     fn ideal() -> SensorSettings {
-        SensorSettings {
-            encoder_bits: 0,
-            motor_speed_step_rad_s: 0.0,
-            motor_speed_noise_rad_s: 0.0,
-            imu_rate_hz: 1000.0,
-            pitch_step_rad: 0.0,
-            pitch_noise_rad: 0.0,
-            pitch_rate_step_rad_s: 0.0,
-            pitch_rate_noise_rad_s: 0.0,
-            ..SensorSettings::default()
-        }
+        SensorSettings { imu_rate_hz: 1000.0, ..SensorSettings::default().exact() }
     }
 
     fn readings(settings: SensorSettings, ticks: u64) -> Vec<Readings> {

@@ -42,17 +42,7 @@ fn settings(scenario: Scenario, controller: ControllerChoice, seed: u64, seconds
 
 /// The robot without noise, sensor steps and delay.
 fn ideal(robot: RobotModel) -> RobotModel {
-    let sensors = SensorSettings {
-        encoder_bits: 0,
-        motor_speed_step_rad_s: 0.0,
-        motor_speed_noise_rad_s: 0.0,
-        imu_rate_hz: 1000.0,
-        pitch_step_rad: 0.0,
-        pitch_noise_rad: 0.0,
-        pitch_rate_step_rad_s: 0.0,
-        pitch_rate_noise_rad_s: 0.0,
-        ..SensorSettings::default()
-    };
+    let sensors = SensorSettings { imu_rate_hz: 1000.0, ..SensorSettings::default().exact() };
     let actuation = Actuation { delay_s: 0.0, torque_noise_nm: 0.0, torque_step_nm: 0.0 };
     RobotModel { sensors, actuation, ..robot }
 }

@@ -132,6 +132,7 @@ impl Spectra {
         match job.poll().1 {
             Outcome::Running => return,
             Outcome::Done(all) => {
+                self.problem = None;
                 for (key, found) in all {
                     let entry = self.entries.entry(key).or_default();
                     entry.found = found;

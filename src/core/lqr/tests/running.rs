@@ -8,7 +8,7 @@ use crate::lqr::{
     Disturbance, SampledLoop, Weights, damping, design, margins, sampled_poles, sampled_response,
 };
 use crate::model_file::{RobotModel, presets};
-use crate::robot::{Actuation, LinearModel, SensorSettings, State, YawHold};
+use crate::robot::{Actuation, LinearModel, State, YawHold};
 use crate::simulate::{Simulation, SimulationSettings};
 
 const TICK_S: f64 = 0.01;
@@ -98,16 +98,7 @@ fn a_pole_reaches_the_unit_circle_at_the_delay_margin() {
 /// The robot without noise, steps, friction and limits, whose motion the linear loop describes.
 fn ideal() -> RobotModel {
     let robot = robot();
-    let sensors = SensorSettings {
-        encoder_bits: 0,
-        motor_speed_step_rad_s: 0.0,
-        motor_speed_noise_rad_s: 0.0,
-        pitch_step_rad: 0.0,
-        pitch_noise_rad: 0.0,
-        pitch_rate_step_rad_s: 0.0,
-        pitch_rate_noise_rad_s: 0.0,
-        ..robot.sensors
-    };
+    let sensors = robot.sensors.exact();
     let actuation = Actuation { delay_s: 0.004, torque_noise_nm: 0.0, torque_step_nm: 0.0 };
     RobotModel { friction: [None; 2], limits: Default::default(), sensors, actuation, ..robot }
 }

@@ -115,6 +115,7 @@ impl Search<'_> {
     /// wrong leaves of the others.
     pub(in crate::refine::robot) fn confirm(&mut self) {
         let Some(bare) = self.fit(&[]) else { return };
+        let held_bare = held_out_error(self, &[], &bare).powi(2);
         let mut place = 0;
         while place < self.picks.len() {
             let mut others = self.picks.clone();
@@ -128,8 +129,7 @@ impl Search<'_> {
             let is_weak = gain < DOUBT * self.least_of(pick.kind, without.score)
                 && unseen(&self.picks, &with) >= unseen(&others, &without);
             let held_out = |picks: &[Candidate], fit: &Fit| held_out_error(self, picks, fit).powi(2);
-            let [held_bare, held_without, held_with] =
-                [held_out(&[], &bare), held_out(&others, &without), held_out(&self.picks, &with)];
+            let [held_without, held_with] = [held_out(&others, &without), held_out(&self.picks, &with)];
             let gains_little = held_without - held_with <= LEFT_OF_FOUND * (held_bare - held_with).max(0.0);
             let is_left = gain < LEFT_OF_FOUND * (bare.score - with.score);
             if is_left || self.is_stuck(&pick, &others) || !pick.kind.trial.brief && (is_weak || gains_little)
