@@ -50,5 +50,6 @@ mod write_file;
 
 pub use app::App;
 pub use document::default_folder as default_state_folder;
+pub use frames::keep_freed_memory;
 pub use tab::Tab;
 pub use window::{WindowError, WindowOptions, run};

@@ -8,6 +8,7 @@ use flqr_core::model_file::Model;
 use flqr_core::record::Mapping;
 
 use crate::app::App;
+use crate::frames::keep_freed_memory;
 use crate::robot::{Devices, System};
 use crate::tab::Tab;
 
@@ -109,6 +110,7 @@ const ICON: &[u8] = include_bytes!("../../assets/icon.png");
 /// No display, no OpenGL, or a missing library of the window system.
 pub fn run(options: WindowOptions) -> Result<(), WindowError> {
     check_display()?;
+    keep_freed_memory();
     // The window library panics, instead of returning an error, where a library is missing.
     let quiet = std::panic::take_hook();
     let opening = std::sync::Arc::new(std::sync::atomic::AtomicBool::new(true));

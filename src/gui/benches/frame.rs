@@ -16,6 +16,8 @@ const NAMES: [&str; 3] = ["displacement", "velocity", "pitch"];
 const FRAME_SAMPLES: usize = 33;
 
 fn main() {
+    // As the window does.
+    flqr_gui::keep_freed_memory();
     divan::main();
 }
 
@@ -39,7 +41,7 @@ struct Live {
 impl Live {
     fn append(&mut self, count: usize) {
         for _ in 0..count {
-            let index = self.generation as usize * FRAME_SAMPLES + self.time_s.len();
+            let index = self.time_s.len();
             self.time_s.push(time_s(index));
             for (line, column) in self.values.iter_mut().enumerate() {
                 column.push(value(line, index));

@@ -4,6 +4,7 @@
 use std::collections::VecDeque;
 use std::ops::Range;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::pyramid::{Pyramid, Steps};
 
@@ -12,10 +13,32 @@ pub(super) const BLOCK: usize = 32;
 /// Samples of a chunk, which is what is dropped at once.
 pub const CHUNK: usize = 512 * BLOCK;
 
+/// Tells a column apart from any other of this run of the program: two with the same one have the same samples, but
+/// for those that one of them has no more or not yet.
+#[derive(Debug, PartialEq, Eq)]
+struct Lineage(u64);
+
+impl Default for Lineage {
+    fn default() -> Self {
+        static NEXT: AtomicU64 = AtomicU64::new(0);
+        Self(NEXT.fetch_add(1, Ordering::Relaxed))
+    }
+}
+
+impl Clone for Lineage {
+    /// What is appended to a clone is its own.
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
+
 /// Numbers in chunks; a clone shares them, so that a worker can read them while more are appended.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Chunks {
     chunks: VecDeque<Arc<Vec<f64>>>,
+    lineage: Lineage,
+    /// Samples that were dropped at the start.
+    dropped: usize,
 }
 
 impl Chunks {
@@ -33,6 +56,23 @@ impl Chunks {
 
     fn len(&self) -> usize {
         self.chunks.back().map_or(0, |last| CHUNK * (self.chunks.len() - 1) + last.len())
+    }
+
+    /// Drops the oldest chunk, if there is one.
+    fn drop_first(&mut self) -> bool {
+        let Some(chunk) = self.chunks.pop_front() else { return false };
+        self.dropped += chunk.len();
+        true
+    }
+
+    /// The same for as long as samples are only appended or dropped at the start.
+    pub(super) fn lineage(&self) -> u64 {
+        self.lineage.0
+    }
+
+    /// How many samples were dropped at the start.
+    pub(super) fn dropped(&self) -> usize {
+        self.dropped
     }
 }
 
@@ -170,7 +210,7 @@ impl TimeColumn {
 
     /// Drops the oldest [`CHUNK`] values.
     pub fn drop_chunk(&mut self) {
-        if self.values.chunks.pop_front().is_some() {
+        if self.values.drop_first() {
             self.steps.drop_chunk();
         }
     }
@@ -190,7 +230,7 @@ impl ValueColumn {
 
     /// Drops the oldest [`CHUNK`] values.
     pub fn drop_chunk(&mut self) {
-        if self.values.chunks.pop_front().is_some() {
+        if self.values.drop_first() {
             self.pyramid.drop_chunk();
         }
     }

@@ -1,4 +1,4 @@
-//! What is drawn of a curve: at most two points a pixel column, from its pyramid, so that cost and picture do not
+//! What is drawn of a curve: the extremes of each pixel column, from its pyramid, so that cost and picture do not
 //! depend on how much data is behind them.
 //!
 //! Awkward values: a sample that is not finite, and a step in time longer than the gap limit, end a piece of
@@ -10,6 +10,7 @@ use std::ops::Range;
 use egui_plot::PlotPoint;
 
 use super::column::{Held, TimeColumn, ValueColumn, Values};
+use super::kept::Kept;
 use super::pyramid::{Extremes, Gaps, Pyramid, Steps, Summary};
 
 /// Data of one curve.
@@ -32,6 +33,16 @@ pub enum Data<'a> {
     Fixed(&'a [f64], &'a [f64]),
     /// Columns that grow, with pyramids of their own.
     Growing(&'a TimeColumn, &'a ValueColumn),
+}
+
+impl Data<'_> {
+    /// The same for as long as what is there stays as it is, though more may come and the oldest go.
+    fn lineages(&self, generation: u64) -> [u64; 2] {
+        match self {
+            Self::Fixed(x, _) => [generation, x.len() as u64],
+            Self::Growing(x, y) => [x.values.lineage(), y.values.lineage()],
+        }
+    }
 }
 
 /// What is visible of a curve.
@@ -88,6 +99,7 @@ pub(super) struct Indexed<'a> {
     gaps: Gaps<'a>,
     scale: f64,
     length: usize,
+    dropped: usize,
 }
 
 /// Samples of a range that stay as they are, for a worker.
@@ -116,16 +128,16 @@ impl Snapshot {
 }
 
 impl<'a> Indexed<'a> {
-    fn new(gaps: Gaps<'a>, scale: f64) -> Self {
+    fn new(gaps: Gaps<'a>, scale: f64, dropped: usize) -> Self {
         let length = gaps.x.len().min(gaps.y.len());
-        Self { gaps, scale, length: if gaps.steps.are_sound() { length } else { 0 } }
+        Self { gaps, scale, length: if gaps.steps.are_sound() { length } else { 0 }, dropped }
     }
 
     /// A curve of columns that grow.
     pub(super) fn growing(x: &'a TimeColumn, y: &'a ValueColumn, scale: f64, gap: f64) -> Self {
-        let (steps, pyramid) = (&x.steps, &y.pyramid);
+        let (steps, pyramid, dropped) = (&x.steps, &y.pyramid, x.values.dropped());
         let (x, y) = (Values::Chunks(&x.values), Values::Chunks(&y.values));
-        Self::new(Gaps { x, steps, y, pyramid, longest: gap }, scale)
+        Self::new(Gaps { x, steps, y, pyramid, longest: gap }, scale, dropped)
     }
 
     /// Number of samples.
@@ -200,6 +212,11 @@ impl<'a> Indexed<'a> {
 
     /// What is drawn between `range[0]` and `range[1]` in a plot of `columns` pixels.
     pub(super) fn visible(&self, range: [f64; 2], columns: usize) -> Visible {
+        self.visible_of(range, columns, &mut Kept::default(), [0; 4])
+    }
+
+    /// The same with what is `kept` of it; see [`Kept::draw`] for `of`.
+    fn visible_of(&self, range: [f64; 2], columns: usize, kept: &mut Kept, of: [u64; 4]) -> Visible {
         let valid = range[0].is_finite() && range[1].is_finite() && range[1] > range[0] && columns > 0;
         if self.length == 0 || !valid {
             return Visible::default();
@@ -214,68 +231,35 @@ impl<'a> Indexed<'a> {
                 if index > drawn.start && self.gaps.is_before(index) {
                     pieces.end();
                 }
-                pieces.sample(self, index);
+                pieces.point(PlotPoint::new(self.x(index), self.y(index)));
             }
         } else {
-            self.by_columns(drawn, (range[1] - range[0]) / columns as f64, &mut pieces);
+            kept.draw(self, of, drawn, (range[1] - range[0]) / columns as f64, &mut pieces);
         }
         pieces.end();
         Visible { pieces: pieces.done, statistics }
     }
 
-    /// Columns start at whole multiples of their width, so that the picture of old samples does not flicker while
-    /// the range follows new ones.
-    fn by_columns(&self, drawn: Range<usize>, width: f64, pieces: &mut Pieces) {
-        let (mut start, mut guess) = (drawn.start, 1);
-        let mut gap = self.gaps.first(drawn.clone());
-        while start < drawn.end {
-            let limit = ((self.x(start) / width).floor() + 1.0) * width;
-            let end = self.next_column(start, drawn.end, limit, guess);
-            guess = end - start;
-            if gap.is_some_and(|gap| gap < end) {
-                if start > drawn.start && self.gaps.is_before(start) {
-                    pieces.end();
-                }
-                self.column(start..end, pieces);
-                gap = self.gaps.first_from(end..drawn.end);
-            } else {
-                pieces.extremes(self, start..end);
-            }
-            start = end;
-        }
+    /// The first sample of those up to `at` that is not below `edge`.
+    pub(super) fn first_from(&self, at: usize, edge: f64) -> usize {
+        self.gaps.x.partition_point(0..at, |x| x < edge)
     }
 
-    /// The first sample after `start` that is not below `limit`: about `guess` samples on, as a rule.
-    fn next_column(&self, start: usize, end: usize, limit: f64, guess: usize) -> usize {
-        let below = |index: usize| self.x(index) < limit;
-        let (mut low, mut high, mut reach) = (start + 1, (start + guess).clamp(start + 1, end), 1);
-        if high < end && below(high) {
-            low = high + 1;
-            while low + reach < end && below(low + reach) {
-                low += reach + 1;
-                reach *= 2;
-            }
-            high = (low + reach).min(end);
-        } else {
-            while high - low > reach && !below(high - reach) {
-                high -= reach;
-                reach *= 2;
-            }
-            if high - low > reach {
-                low = high - reach + 1;
-            }
-        }
-        self.gaps.x.partition_point(low..high, |x| x < limit)
+    pub(super) fn gaps(&self) -> &Gaps<'a> {
+        &self.gaps
     }
 
-    fn column(&self, range: Range<usize>, pieces: &mut Pieces) {
-        let Some(first) = self.gaps.first(range.clone()) else { return pieces.extremes(self, range) };
-        pieces.extremes(self, range.start..first);
-        pieces.end();
-        let last = self.gaps.last(range.clone()).unwrap_or(first);
-        pieces.extremes(self, first..last);
-        pieces.end();
-        pieces.extremes(self, last..range.end);
+    /// How many samples the curve has lost at its start.
+    pub(super) fn dropped(&self) -> usize {
+        self.dropped
+    }
+
+    /// Both extremes of a range in their order; none where no sample is finite.
+    pub(super) fn extremes(&self, range: Range<usize>) -> Option<[PlotPoint; 2]> {
+        let found = self.gaps.pyramid.extremes(self.gaps.y, range)?;
+        let low = PlotPoint::new(self.x(found.min_at), found.min * self.scale);
+        let high = PlotPoint::new(self.x(found.max_at), found.max * self.scale);
+        Some(if found.min_at <= found.max_at { [low, high] } else { [high, low] })
     }
 }
 
@@ -284,7 +268,14 @@ impl<'a> Indexed<'a> {
 pub struct DecimationCache {
     key: Option<(u64, [u64; 4], usize)>,
     visible: Visible,
-    /// Of columns that stay: the generation that the pyramids are of.
+    kept: Kept,
+    own: OwnPyramids,
+}
+
+/// Pyramids of columns that have none.
+#[derive(Default)]
+struct OwnPyramids {
+    /// Generation and length of what they are of.
     of: Option<(u64, usize)>,
     steps: Steps,
     pyramid: Pyramid,
@@ -313,11 +304,13 @@ impl DecimationCache {
         range: [f64; 2],
         columns: usize,
     ) -> &Visible {
-        let bits = [range[0], range[1], look[0], look[1]].map(f64::to_bits);
-        let key = Some((generation, bits, columns));
+        let [start, end, scale, gap] = [range[0], range[1], look[0], look[1]].map(f64::to_bits);
+        let key = Some((generation, [start, end, scale, gap], columns));
         if self.key != key {
             self.key = key;
-            self.visible = self.indexed(data, look, generation).visible(range, columns);
+            let [x, y] = data.lineages(generation);
+            let curve = self.own.indexed(data, look, generation);
+            self.visible = curve.visible_of(range, columns, &mut self.kept, [x, y, scale, gap]);
         }
         &self.visible
     }
@@ -328,12 +321,13 @@ impl DecimationCache {
     }
 
     /// The curve with its pyramids, which are made here for columns that have none.
-    pub(super) fn indexed<'a>(
-        &'a mut self,
-        data: Data<'a>,
-        [scale, gap]: [f64; 2],
-        generation: u64,
-    ) -> Indexed<'a> {
+    pub(super) fn indexed<'a>(&'a mut self, data: Data<'a>, look: [f64; 2], generation: u64) -> Indexed<'a> {
+        self.own.indexed(data, look, generation)
+    }
+}
+
+impl OwnPyramids {
+    fn indexed<'a>(&'a mut self, data: Data<'a>, [scale, gap]: [f64; 2], generation: u64) -> Indexed<'a> {
         match data {
             Data::Growing(x, y) => Indexed::growing(x, y, scale, gap),
             Data::Fixed(x, y) => {
@@ -343,7 +337,7 @@ impl DecimationCache {
                     (self.of, self.steps, self.pyramid) = (of, Steps::of(x), Pyramid::of(y));
                 }
                 let (steps, pyramid) = (&self.steps, &self.pyramid);
-                Indexed::new(Gaps { x, steps, y, pyramid, longest: gap }, scale)
+                Indexed::new(Gaps { x, steps, y, pyramid, longest: gap }, scale, 0)
             }
         }
     }
@@ -356,35 +350,38 @@ pub fn decimate(curve: Curve<'_>, range: [f64; 2], columns: usize) -> Visible {
 
 /// Pieces of a line while it is put together.
 #[derive(Default)]
-struct Pieces {
+pub(super) struct Pieces {
     done: Vec<Vec<PlotPoint>>,
     current: Vec<PlotPoint>,
 }
 
 impl Pieces {
-    fn end(&mut self) {
+    pub(super) fn end(&mut self) {
         if !self.current.is_empty() {
             self.done.push(std::mem::take(&mut self.current));
         }
     }
 
+    /// Makes room for so many points.
+    pub(super) fn reserve(&mut self, points: usize) {
+        self.current.reserve(points);
+    }
+
     /// One sample; what is no number, or none any more in the unit that is shown, ends the piece.
-    fn sample(&mut self, curve: &Indexed<'_>, index: usize) {
-        let (x, y) = (curve.x(index), curve.y(index));
-        if y.is_finite() {
-            self.current.push(PlotPoint::new(x, y));
+    fn point(&mut self, point: PlotPoint) {
+        if point.y.is_finite() {
+            self.current.push(point);
         } else {
             self.end();
         }
     }
 
     /// Both extremes of a range in their order; one point where they are the same.
-    fn extremes(&mut self, curve: &Indexed<'_>, range: Range<usize>) {
-        let Some(found) = curve.gaps.pyramid.extremes(curve.gaps.y, range) else { return };
-        let (early, late) = (found.min_at.min(found.max_at), found.min_at.max(found.max_at));
-        self.sample(curve, early);
+    pub(super) fn extremes(&mut self, extremes: Option<[PlotPoint; 2]>) {
+        let Some([early, late]) = extremes else { return };
+        self.point(early);
         if late != early {
-            self.sample(curve, late);
+            self.point(late);
         }
     }
 }
@@ -407,7 +404,8 @@ mod tests {
         let visible = decimate(curve(&x, &y), [0.0, 60.0], 500);
         let points: Vec<_> = visible.pieces.concat();
         assert_eq!(visible.pieces.len(), 1);
-        assert!(points.len() <= 2 * 501, "{}", points.len());
+        // Columns are up to an eighth narrower than a pixel.
+        assert!(points.len() <= 2 * (500 * 9 / 8 + 1), "{}", points.len());
         assert!(points.windows(2).all(|pair| pair[0].x <= pair[1].x));
         let highest = points.iter().map(|p| p.y).fold(f64::MIN, f64::max);
         let lowest = points.iter().map(|p| p.y).fold(f64::MAX, f64::min);
@@ -449,13 +447,33 @@ mod tests {
         (x, y)
     }
 
+    /// The largest of 8 to 15 times a power of two that is not above `width`.
+    fn width_of_columns(width: f64) -> f64 {
+        let mut unit = 2.0_f64.powi(60);
+        while 8.0 * unit > width {
+            unit *= 0.5;
+        }
+        (8..16).map(|eighths| f64::from(eighths) * unit).rfind(|column| *column <= width).unwrap()
+    }
+
     /// Walks over every sample: columns, then the runs between gaps of each, the inner ones as one.
     fn brute_force(curve: Curve<'_>, range: [f64; 2], columns: usize) -> Vec<Vec<PlotPoint>> {
         let Curve { x, y, scale, gap } = curve;
         let inside: Vec<usize> = (0..x.len()).filter(|&i| x[i] >= range[0] && x[i] <= range[1]).collect();
         let after = x.iter().filter(|&&x| x < range[0]).count();
-        let (start, end) = (after.saturating_sub(1), (after + inside.len() + 1).min(x.len()));
-        let width = if end - start <= 2 * columns { 0.0 } else { (range[1] - range[0]) / columns as f64 };
+        let (mut start, mut end) = (after.saturating_sub(1), (after + inside.len() + 1).min(x.len()));
+        let mut width = 0.0;
+        if end - start > 2 * columns {
+            width = width_of_columns((range[1] - range[0]) / columns as f64);
+            // Columns are whole.
+            let same = |i: usize, j: usize| (x[i] / width).floor() == (x[j] / width).floor();
+            while start > 0 && same(start - 1, start) {
+                start -= 1;
+            }
+            while end < x.len() && same(end - 1, end) {
+                end += 1;
+            }
+        }
         // A column is the list of its runs; a run is a list of samples.
         let mut picture: Vec<Vec<Vec<usize>>> = Vec::new();
         let mut limit = f64::NEG_INFINITY;
@@ -543,6 +561,59 @@ mod tests {
         let size = ends[0].abs().max(ends[1].abs()).max(1.0);
         assert!((found.mean - mean).abs() <= 1e-11 * size, "{} {mean}", found.mean);
         assert!((found.std - std).abs() <= 1e-9 * size, "{} {std}", found.std);
+    }
+
+    /// Data grow, the oldest are dropped, the view follows, stands, moves and zooms: what is kept from one frame to the
+    /// next makes no difference.
+    #[test]
+    fn what_is_kept_of_the_last_frame_draws_what_a_fresh_start_would() {
+        for seed in 0..6 {
+            let mut random = Random(100 + seed);
+            let (x, y) = walk(&mut random, 4 * CHUNK);
+            let (mut time, mut values) = (TimeColumn::default(), ValueColumn::default());
+            let (mut cache, mut taken, mut dropped) = (DecimationCache::default(), 0, 0);
+            let (mut span, mut center, mut columns) = (1.0, x[0], 300);
+            for frame in 0..400 {
+                for _ in 0..random.below(300).min(x.len() - taken) {
+                    time.push(x[taken]);
+                    values.push(y[taken]);
+                    taken += 1;
+                }
+                if time.len() > 2 * CHUNK + 5000 {
+                    time.drop_chunk();
+                    values.drop_chunk();
+                    dropped += CHUNK;
+                }
+                if taken == dropped {
+                    continue;
+                }
+                let [first, last] = [x[dropped], x[taken - 1]];
+                match random.below(40) {
+                    0 => span = (last - first + 1.0) * random.unit(),
+                    1 => center = first + (last - first) * random.unit(),
+                    2 => columns = 50 + random.below(900),
+                    3..20 => center += span * (random.unit() - 0.5) * 0.3,
+                    20..25 => center = last - 0.5 * span,
+                    25..30 => (span, center) = (last - first + 1e-3, 0.5 * (first + last)),
+                    _ => {}
+                }
+                let range = [center - 0.5 * span, center + 0.5 * span];
+                let data = Data::Growing(&time, &values);
+                let found = cache.visible_of(data, [2.0, 0.1], frame, range, columns);
+                let fresh = Indexed::growing(&time, &values, 2.0, 0.1).visible(range, columns);
+                assert!(*found == fresh, "seed {seed}, frame {frame}, {range:?}, {columns} columns");
+            }
+            // Another column in the same place is another curve.
+            let count = time.len();
+            (time, values) = (TimeColumn::default(), ValueColumn::default());
+            (0..count).for_each(|index| {
+                time.push(x[dropped + index]);
+                values.push(1.0);
+            });
+            let range = [x[dropped], x[taken - 1]];
+            let found = cache.visible_of(Data::Growing(&time, &values), [2.0, 0.1], 401, range, columns);
+            assert!(found.pieces.iter().flatten().all(|point| point.y == 2.0), "seed {seed}");
+        }
     }
 
     #[test]

@@ -6,6 +6,7 @@ mod cursors;
 mod decimate;
 mod export;
 mod figure;
+mod kept;
 mod marks;
 mod pyramid;
 mod readout;
