@@ -5,6 +5,7 @@ mod keep;
 mod questions;
 mod shell;
 
+use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -21,7 +22,7 @@ use crate::commands::{Palette, Situation};
 use crate::context::ViewContext;
 use crate::design::Designer;
 use crate::dialog::{Answer, Dialog};
-use crate::document::{Base, Content, Opened, Store, Undo};
+use crate::document::{Base, Content, Document, Opened, Store, Undo};
 use crate::experiments::ExperimentsTab;
 use crate::frames::Frames;
 use crate::friction::FrictionTab;
@@ -70,6 +71,10 @@ pub struct App {
     store: Option<Store>,
     session_job: Option<keep::SessionJob>,
     question: Option<questions::Question>,
+    /// Questions for when that one is answered.
+    waiting: VecDeque<questions::Question>,
+    /// What there was before anything was read; none once that has been.
+    beginning: Option<Box<Document>>,
     /// The answer that has the keyboard's focus.
     question_focus: Option<&'static str>,
     /// The file dialog was asked for where no path field is in view.
@@ -150,6 +155,8 @@ impl App {
             store: None,
             session_job: None,
             question: None,
+            waiting: VecDeque::new(),
+            beginning: None,
             question_focus: None,
             asks_path: false,
             leave_after_save: false,
@@ -535,6 +542,7 @@ impl App {
             "unsaved_changes": self.session != self.saved,
             "tab": self.tab.key(),
             "shown": self.layout.shown().iter().map(|tab| tab.key()).collect::<Vec<_>>(),
+            "questions_waiting": self.waiting.len(),
             "question": self.question.as_ref().map(questions::Question::key),
             "question_focus": self.question_focus,
             "undo": self.undo.undoable().collect::<Vec<_>>(),

@@ -1,26 +1,43 @@
 //! Background jobs: a handle with progress, cancel and a result, on a named thread.
 
+use std::collections::VecDeque;
 use std::ops::ControlFlow;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
+use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 /// Wakes the window after a worker has put something in a channel.
 pub(crate) type Waker = Arc<dyn Fn() + Send + Sync>;
 
-/// Progress reports that wait for the window; more are dropped, since only the newest matters.
+/// Progress reports that wait for the window; each one more takes the place of the newest.
 const PROGRESS_CAPACITY: usize = 256;
 
 /// Progress wakes the window at most this often, ms: drawing it must not take the processor from the work.
 const WAKE_INTERVAL_MS: u64 = 50;
+
+/// Reports on their way to the window.
+struct Reports<P>(Arc<Mutex<VecDeque<P>>>);
+
+impl<P> Reports<P> {
+    fn put(&self, report: P) {
+        // Nobody panics while it is locked.
+        let mut waiting = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        waiting.truncate(PROGRESS_CAPACITY - 1);
+        waiting.push_back(report);
+    }
+
+    fn take(&self) -> Vec<P> {
+        std::mem::take(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner)).into()
+    }
+}
 
 /// What a job reports through.
 pub(crate) struct Reporter<P> {
     started: Instant,
     /// When progress may wake the window next, ms after the start.
     next_wake_ms: AtomicU64,
-    sender: SyncSender<P>,
+    reports: Reports<P>,
     cancel: Arc<AtomicBool>,
     waker: Waker,
 }
@@ -37,7 +54,8 @@ impl<P> Reporter<P> {
             return ControlFlow::Break(());
         }
         let now_ms = self.started.elapsed().as_millis() as u64;
-        if self.sender.try_send(progress).is_ok() && now_ms >= self.next_wake_ms.load(Ordering::Relaxed) {
+        self.reports.put(progress);
+        if now_ms >= self.next_wake_ms.load(Ordering::Relaxed) {
             self.next_wake_ms.store(now_ms + WAKE_INTERVAL_MS, Ordering::Relaxed);
             (self.waker)();
         }
@@ -59,7 +77,7 @@ pub(crate) enum Outcome<R> {
 /// A running job. Dropping it cancels the work and drops its result, so a result can never be taken for
 /// that of a later job. The thread isn't joined: the window must not wait for it.
 pub(crate) struct Job<P, R> {
-    progress: Receiver<P>,
+    reports: Reports<P>,
     result: Receiver<R>,
     cancel: Arc<AtomicBool>,
 }
@@ -71,13 +89,13 @@ impl<P: Send + 'static, R: Send + 'static> Job<P, R> {
         waker: &Waker,
         work: impl FnOnce(&Reporter<P>) -> R + Send + 'static,
     ) -> std::io::Result<Self> {
-        let (progress_sender, progress) = sync_channel(PROGRESS_CAPACITY);
+        let reports = Arc::new(Mutex::new(VecDeque::new()));
         let (result_sender, result) = sync_channel(1);
         let cancel = Arc::new(AtomicBool::new(false));
         let reporter = Reporter {
             started: Instant::now(),
             next_wake_ms: AtomicU64::new(0),
-            sender: progress_sender,
+            reports: Reports(Arc::clone(&reports)),
             cancel: Arc::clone(&cancel),
             waker: Arc::clone(waker),
         };
@@ -88,17 +106,17 @@ impl<P: Send + 'static, R: Send + 'static> Job<P, R> {
             drop(result_sender);
             drop(wake);
         })?;
-        Ok(Self { progress, result, cancel })
+        Ok(Self { reports: Reports(reports), result, cancel })
     }
 
-    /// What has come since the last call, without waiting.
+    /// What has come since the last call: of many reports the first and always the last.
     pub(crate) fn poll(&mut self) -> (Vec<P>, Outcome<R>) {
         let outcome = match self.result.try_recv() {
             Ok(result) => Outcome::Done(result),
             Err(TryRecvError::Empty) => Outcome::Running,
             Err(TryRecvError::Disconnected) => Outcome::Broken,
         };
-        (self.progress.try_iter().collect(), outcome)
+        (self.reports.take(), outcome)
     }
 
     /// Asks the work to stop; its result says that it was stopped.
@@ -151,6 +169,19 @@ mod tests {
         let (progress, outcome) = wait(&mut job);
         assert_eq!(progress, [0, 1, 2, 3, 4]);
         assert!(matches!(outcome, Outcome::Done(true)));
+    }
+
+    #[test]
+    fn the_last_progress_comes_however_much_there_was() {
+        let count = 10 * PROGRESS_CAPACITY;
+        let work = move |reporter: &Reporter<usize>| (0..=count).all(|i| reporter.progress(i).is_continue());
+        let mut job = Job::start("test", &no_waker(), work).unwrap();
+        while Arc::strong_count(&job.reports.0) > 1 {
+            std::thread::yield_now();
+        }
+        let (progress, outcome) = job.poll();
+        assert_eq!((progress.len(), progress.last()), (PROGRESS_CAPACITY, Some(&count)));
+        assert!(progress.is_sorted() && matches!(outcome, Outcome::Done(true)));
     }
 
     #[test]

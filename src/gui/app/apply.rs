@@ -472,7 +472,8 @@ impl App {
                 Outcome::Done(Ok(Saved::AnotherIsThere)) => {
                     self.leave_after_save = false;
                     self.say(format!("{} exists and was not replaced.", path.display()));
-                    self.tune.ask_to_overwrite(path);
+                    let save = Command::OverwriteModel(path.clone());
+                    self.ask(Question::Overwrite { path, what: "model", save });
                 }
                 Outcome::Done(Err(problem)) => {
                     self.leave_after_save = false;

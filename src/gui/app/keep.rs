@@ -166,12 +166,21 @@ impl App {
     }
 
     /// Takes over how the window of before looked: where this one begins, so nothing that can be undone.
-    fn begin_as(&mut self, document: &Document, ctx: &Context) {
+    /// What was changed while the disk was read stays as it is.
+    fn begin_as(&mut self, mut document: Document, ctx: &Context) {
         self.watch(true);
-        if let Some(runs) = &document.runs {
-            self.runs.take(runs.clone());
+        if let Some(runs) = document.runs.take() {
+            let renamed = self.runs.begin_with(runs);
+            if renamed > 0 {
+                self.say(format!(
+                    "The runs of before were read late: of this window's own the last {renamed} rows have new numbers."
+                ));
+            }
         }
-        for problem in self.take_surroundings(document, ctx) {
+        if let Some(beginning) = self.beginning.take() {
+            document.leave_out_changes(&beginning, &self.document(ctx));
+        }
+        for problem in self.take_surroundings(&document, ctx) {
             self.fail(format!("The session of before: {problem}."));
         }
         let now = self.content();
@@ -243,6 +252,9 @@ impl App {
 
     /// Keeps the session, and takes in what was kept.
     pub(super) fn keep_session(&mut self, ctx: &Context) {
+        if self.opening.is_some() && self.beginning.is_none() {
+            self.beginning = Some(Box::new(self.document(ctx)));
+        }
         self.drain_opening(ctx);
         self.drain_session_job(ctx);
         let Some(store) = &mut self.store else { return };
@@ -286,16 +298,16 @@ impl App {
         });
         let Some(left) = opened.left else {
             if let Some(document) = last {
-                self.begin_as(&document, ctx);
+                self.begin_as(document, ctx);
             }
             return;
         };
         let (document, problems) = Document::from_json(&left.text);
-        self.begin_as(&document, ctx);
+        self.begin_as(document.clone(), ctx);
         let whole = problems.is_empty();
         if document.may_have_unsaved_model(&problems) {
             self.say_unread(&left.path, &problems);
-            self.question = Some(Question::Restore { left, document: Box::new(document), whole });
+            self.ask(Question::Restore { left, document: Box::new(document), whole });
         } else if whole {
             self.take_over(left);
         } else {
@@ -378,7 +390,8 @@ impl App {
                 Outcome::Running => self.session_job = Some(SessionJob::Save(path, job)),
                 Outcome::Done(Ok(Saved::AnotherIsThere)) => {
                     self.say(format!("{} exists and was not replaced.", path.display()));
-                    self.ask(Question::Overwrite { path });
+                    let save = Command::SaveSession { path: path.clone(), replace: true };
+                    self.ask(Question::Overwrite { path, what: "session", save });
                 }
                 Outcome::Done(Ok(Saved::Written)) => {
                     self.say(format!("The session is saved to {}.", path.display()));

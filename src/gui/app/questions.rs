@@ -29,8 +29,8 @@ pub(super) enum Question {
     Restore { left: Left, document: Box<Document>, whole: bool },
     /// What was read is to replace a model with changes.
     Replace { by: Replacement, changes: Vec<Change> },
-    /// A session is to be saved where a file is.
-    Overwrite { path: PathBuf },
+    /// What is to be saved where another file is, and how.
+    Overwrite { path: PathBuf, what: &'static str, save: Command },
     /// A path is wanted; why there is no dialog for it.
     Path { purpose: FilePurpose, text: String, reason: Option<String>, has_focus: bool },
     /// What can be undone.
@@ -64,7 +64,33 @@ enum Answer {
     Redo(usize),
 }
 
+impl Replacement {
+    fn model(&self) -> Option<&Model> {
+        match self {
+            Self::Model(model, _) => Some(model),
+            Self::Session(document, _) => document.model.as_ref(),
+        }
+    }
+}
+
+/// A preset by its number.
+fn preset(number: usize) -> Option<Result<Model, String>> {
+    let (name, text) = presets::ALL.get(number)?;
+    Some(Model::from_toml(text, name).map_err(|error| error.to_string()))
+}
+
 impl Question {
+    /// Whether it is put already by `other`.
+    fn is_same(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Leave, Self::Leave) | (Self::Steps, Self::Steps) => true,
+            (Self::Preset { number, .. }, Self::Preset { number: other, .. }) => number == other,
+            (Self::Path { purpose, .. }, Self::Path { purpose: other, .. }) => purpose == other,
+            (Self::Overwrite { path, .. }, Self::Overwrite { path: other, .. }) => path == other,
+            _ => false,
+        }
+    }
+
     /// For scripts.
     pub(super) fn key(&self) -> &'static str {
         match self {
@@ -80,32 +106,54 @@ impl Question {
 }
 
 impl App {
-    /// Asks, unless what was left of a crash is still to be answered.
+    /// Asks, as soon as what is asked already has been answered; at once where it is about the window's end.
     pub(super) fn ask(&mut self, question: Question) {
-        if !matches!(self.question, Some(Question::Restore { .. })) {
-            self.question = Some(question);
+        let mut asked = self.question.iter().chain(&self.waiting);
+        if asked.any(|asked| asked.is_same(&question)) {
+            return;
+        }
+        match (&self.question, &question) {
+            (None, _) => self.question = Some(question),
+            (Some(open), Question::Leave | Question::Restore { .. })
+                if !matches!(open, Question::Restore { .. }) =>
+            {
+                self.waiting.extend(self.question.replace(question));
+                self.waiting.rotate_right(1);
+            }
+            _ => self.waiting.push_back(question),
+        }
+    }
+
+    /// The next question, with what would change as things are now.
+    fn ask_next(&mut self) {
+        self.question = self.waiting.pop_front();
+        let by = match &self.question {
+            Some(Question::Replace { by, .. }) => by.model().cloned(),
+            Some(Question::Preset { number, .. }) => preset(*number).and_then(Result::ok),
+            _ => None,
+        };
+        if let (Some(by), Some(Question::Replace { changes, .. } | Question::Preset { changes, .. })) =
+            (by, &mut self.question)
+        {
+            *changes = self.session.model().changes_to(&by);
         }
     }
 
     /// Asks before a file replaces a model that has changes.
     pub(super) fn ask_replacement(&mut self, by: Replacement) {
-        let model = match &by {
-            Replacement::Model(model, _) => Some(&**model),
-            Replacement::Session(document, _) => document.model.as_ref(),
-        };
-        let changes = model.map(|model| self.session.model().changes_to(model)).unwrap_or_default();
+        let changes = by.model().map(|model| self.session.model().changes_to(model)).unwrap_or_default();
         self.ask(Question::Replace { by, changes });
     }
 
     /// Asks before a preset replaces the model, with what changes.
     pub(super) fn ask_preset(&mut self, number: usize) {
-        let Some((name, text)) = presets::ALL.get(number) else { return };
-        match Model::from_toml(text, name) {
-            Ok(model) => {
+        match preset(number) {
+            None => {}
+            Some(Ok(model)) => {
                 let changes = self.session.model().changes_to(&model);
-                self.ask(Question::Preset { number, name, changes });
+                self.ask(Question::Preset { number, name: presets::ALL[number].0, changes });
             }
-            Err(error) => self.fail(error.to_string()),
+            Some(Err(error)) => self.fail(error),
         }
     }
 
@@ -121,6 +169,9 @@ impl App {
 
     /// Draws the open question.
     pub(super) fn question_ui(&mut self, ctx: &Context) {
+        if self.question.is_none() {
+            self.ask_next();
+        }
         let Some(mut question) = self.question.take() else {
             self.question_focus = None;
             return;
@@ -209,7 +260,7 @@ impl App {
                 path_ui(*purpose, text, reason.as_deref(), has_focus, &self.recent, ui)
             }
             Question::Replace { by, changes } => self.replace_ui(by, changes, ui),
-            Question::Overwrite { path } => overwrite_ui(path, ui),
+            Question::Overwrite { path, what, save } => overwrite_ui(path, what, save, ui),
             Question::Steps => self.steps_ui(ui),
         }
     }
@@ -347,14 +398,14 @@ fn preset_ui(number: usize, name: &str, changes: &[Change], ui: &mut Ui) -> Repl
     )
 }
 
-fn overwrite_ui(path: &Path, ui: &mut Ui) -> Reply {
+fn overwrite_ui(path: &Path, what: &str, save: &Command, ui: &mut Ui) -> Reply {
     ui.heading("Replace the file?");
     ui.label(format!("There is already a file {}.", path.display()));
-    let replace = Command::SaveSession { path: path.to_owned(), replace: true };
+    let help = format!("Save the {what} in its place");
     answers_ui(
         ui,
         [
-            (Key::R, "Replace it", "Save the session in its place", Answer::Send(replace)),
+            (Key::R, "Replace it", &help, Answer::Send(save.clone())),
             (Key::C, "Cancel", "Leave the file as it is", Answer::Close),
         ],
     )

@@ -63,6 +63,22 @@ impl Document {
         self.has_unsaved_model() || (self.model.is_some() && !problems.is_empty())
     }
 
+    /// Leaves out of how the window looks and what its forms hold whatever differs between `start` and `now`.
+    pub(crate) fn leave_out_changes(&mut self, start: &Self, now: &Self) {
+        fn part<T: PartialEq>(part: &mut Option<T>, start: &Option<T>, now: &Option<T>) {
+            if start != now {
+                *part = None;
+            }
+        }
+        part(&mut self.experiment, &start.experiment, &now.experiment);
+        part(&mut self.column_map, &start.column_map, &now.column_map);
+        part(&mut self.connection, &start.connection, &now.connection);
+        part(&mut self.layout, &start.layout, &now.layout);
+        part(&mut self.dark, &start.dark, &now.dark);
+        part(&mut self.zoom, &start.zoom, &now.zoom);
+        part(&mut self.degrees, &start.degrees, &now.degrees);
+    }
+
     /// The text of the file.
     pub(crate) fn to_json(&self) -> String {
         let path = |path: &Option<PathBuf>| path.as_ref().and_then(|path| path.to_str().map(str::to_owned));

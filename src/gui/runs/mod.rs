@@ -127,9 +127,17 @@ impl RunsTab {
         &self.ledger
     }
 
-    /// Shows other rows; gives back those of before.
+    /// Puts rows that were kept in a file before those that are there, which get new numbers; says how many those are.
+    pub(crate) fn begin_with(&mut self, earlier: Ledger) -> usize {
+        self.ticked.clear();
+        self.reading.clear();
+        self.ledger.begin_with(earlier)
+    }
+
+    /// Shows other rows, and those that have come since these were opened; gives back those of before.
     pub(crate) fn take(&mut self, mut ledger: Ledger) -> Ledger {
         ledger.take_series(&self.ledger);
+        ledger.follow(&mut self.ledger);
         let before = std::mem::replace(&mut self.ledger, ledger);
         self.ticked.retain(|number| self.ledger.row(*number).is_some_and(|row| before.has(row)));
         self.reading.clear();

@@ -187,6 +187,8 @@ pub(crate) struct Ledger {
     rows: Vec<Arc<Run>>,
     /// What was taken out, newest last; no file keeps it.
     deleted: Vec<Vec<Run>>,
+    /// The number given last when this window showed it first: runs after it are this window's. No file keeps it.
+    opened_at: Option<u64>,
 }
 
 impl PartialEq for Ledger {
@@ -252,7 +254,7 @@ impl Ledger {
         let last = value.get("last").and_then(serde_json::Value::as_u64).unwrap_or(0).min(LARGEST_NUMBER);
         let last = rows.last().map_or(0, |row| row.number).max(last);
         let problem = (missing > 0).then(|| format!("“runs” has {missing} rows that cannot be read"));
-        Ok((Self { last, rows, deleted: Vec::new() }, problem))
+        Ok((Self { last, rows, deleted: Vec::new(), opened_at: None }, problem))
     }
 
     /// Whether a row is the same run as one of `other`, whatever has been noted on it since.
@@ -283,6 +285,29 @@ impl Ledger {
                 Arc::make_mut(row).series = Some(series);
             }
         }
+    }
+
+    /// Is shown in place of `before`: what was run since both were opened comes along, whichever is undone, and no
+    /// number is given again.
+    pub(super) fn follow(&mut self, before: &mut Self) {
+        let start = *before.opened_at.get_or_insert(0);
+        self.last = self.last.max(before.last);
+        let since = start.max(*self.opened_at.get_or_insert(self.last));
+        let is_new = |row: &&Arc<Run>| row.number > since && self.row(row.number).is_none();
+        let new: Vec<_> = before.rows.iter().filter(is_new).cloned().collect();
+        self.rows.extend(new);
+        self.rows.sort_by_key(|row| row.number);
+    }
+
+    /// Puts the rows of a file before its own, which get new numbers; gives how many those are.
+    pub(super) fn begin_with(&mut self, earlier: Self) -> usize {
+        let own = std::mem::replace(self, earlier);
+        for row in &own.rows {
+            self.last += 1;
+            self.rows.push(Arc::new(Run { number: self.last, ..(**row).clone() }));
+        }
+        self.opened_at = Some(0);
+        own.rows.len()
     }
 
     /// Takes rows out; gives the numbers of those that were there.
@@ -429,6 +454,48 @@ mod tests {
         assert_eq!(drawn(&ledger), [true, false, false]);
         ledger.set_series(2, long(30));
         assert_eq!(drawn(&ledger), [false, true, false]);
+    }
+
+    #[test]
+    fn what_was_run_since_a_ledger_was_opened_outlives_its_undo_and_redo() {
+        let numbers = |ledger: &Ledger| ledger.rows().iter().map(|run| run.number).collect::<Vec<_>>();
+        let mut first = Ledger::default();
+        for _ in 0..3 {
+            first.add(run(0, &presets::paper()), 7);
+        }
+        let mut second = Ledger::default();
+        second.add(run(0, &presets::paper()), 9);
+        let value = second.to_value();
+        let (mut second, _) = Ledger::from_value(&value).unwrap();
+        second.follow(&mut first);
+        assert_eq!(numbers(&second), [1], "opening replaces");
+        assert_eq!(second.add(run(0, &presets::paper()), 10), 4, "3 was given in this window");
+        let mut back = first.clone();
+        back.follow(&mut second);
+        assert_eq!(numbers(&back), [1, 2, 3, 4], "undo");
+        assert_eq!(back.add(run(0, &presets::paper()), 11), 5);
+        second.follow(&mut back);
+        assert_eq!(numbers(&second), [1, 4, 5], "redo");
+        let mut third = Ledger::default();
+        third.follow(&mut second);
+        assert_eq!(third.add(run(0, &presets::paper()), 12), 6);
+        second.follow(&mut third);
+        back.follow(&mut second);
+        assert_eq!(numbers(&back), [1, 2, 3, 4, 5, 6], "two undone");
+        assert_eq!(back.row(4).unwrap().unix_s, 10);
+    }
+
+    #[test]
+    fn rows_of_a_file_that_was_read_late_come_before_those_of_now() {
+        let mut earlier = Ledger::default();
+        for _ in 0..2 {
+            earlier.add(run(0, &presets::paper()), 7);
+        }
+        let mut now = Ledger::default();
+        now.add(run(0, &presets::paper()), 8);
+        assert_eq!(now.begin_with(earlier), 1);
+        let rows: Vec<_> = now.rows().iter().map(|run| (run.number, run.unix_s)).collect();
+        assert_eq!(rows, [(1, 7), (2, 7), (3, 8)]);
     }
 
     #[test]

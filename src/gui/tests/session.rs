@@ -221,6 +221,55 @@ fn runs_are_replaced_by_those_of_a_file_after_a_question_and_come_back_by_undo()
     assert_eq!(titles(&window), ["other"]);
 }
 
+/// A pipe holds the reading up until something is written to it.
+#[cfg(unix)]
+#[test]
+fn what_was_changed_while_the_last_session_was_read_stays() {
+    let folder = Folder::new("late");
+    let pipe = folder.0.join("last.flqr-session");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    let mut window = open(folder.options(), SIZE);
+    command(&mut window, "Robot to the bottom");
+    let row = json!({
+        "number": 1, "unix_s": 7, "kind": "fit", "title": "before", "seed": 1, "sources": "0", "made_with": {},
+        "result": "", "note": "",
+    });
+    let text = json!({
+        "format": "flqr-session", "version": 1, "layout": { "tabs": ["tune"] }, "zoom": 1.25,
+        "runs": { "last": 1, "rows": [row] },
+    });
+    std::fs::write(&pipe, text.to_string()).unwrap();
+    let found = until(&mut window, "the session", |s| s["runs_tab"]["rows"].as_array().unwrap().len() == 1);
+    assert_eq!(found["shown"], json!(["tune", "robot"]), "the user's own");
+    window.run_steps(2);
+    assert_eq!(window.ctx.zoom_factor(), 1.25, "which nobody had changed");
+}
+
+/// A pipe holds the reading up until something is written to it.
+#[cfg(unix)]
+#[test]
+fn a_question_waits_for_the_one_that_is_open() {
+    let folder = Folder::new("queue");
+    let pipe = folder.0.join("pipe.toml");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    let mut window = open(folder.options(), SIZE);
+    enter(&mut window, "pitch weight", "5");
+    enter(&mut window, "model path", pipe.to_str().unwrap());
+    command(&mut window, "steps");
+    assert_eq!(state(&window)["question"], "steps");
+    std::fs::write(&pipe, ROBOT.replace("Test robot", "From the pipe")).unwrap();
+    let found = until(&mut window, "the other question", |s| s["questions_waiting"] == 1);
+    assert_eq!(found["question"], "steps", "what is open stays");
+    assert!(!closes(&mut window), "the model has changes");
+    assert_eq!(state(&window)["question"], "leave", "the window's end comes first");
+    for (answer, next) in [("Cancel", json!("steps")), ("Close", json!("replace")), ("Keep it", Value::Null)]
+    {
+        click(&mut window, answer);
+        assert_eq!(state(&window)["question"], next, "after {answer}");
+    }
+    assert_eq!(pitch_weight(&window), 5.0);
+}
+
 #[test]
 fn a_session_brings_the_logs_of_the_refine_page_back() {
     let folder = Folder::new("logs");

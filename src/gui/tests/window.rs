@@ -466,9 +466,9 @@ fn a_model_is_saved_and_loaded_back() {
     window.event(Event::Text(file.name().to_owned()));
     window.run_steps(2);
     click(&mut window, "Save");
-    until(&mut window, "the question", |s| s["message"].as_str().is_some_and(|m| m.contains("exists")));
-    window.step();
-    click(&mut window, "Overwrite");
+    until(&mut window, "the question", |s| s["question"] == "overwrite");
+    window.run_steps(2);
+    click(&mut window, "Replace it");
     until(&mut window, "saving", |s| s["unsaved_changes"] == false);
     enter(&mut window, "velocity weight", "5");
     click(&mut window, "Load");
@@ -493,18 +493,18 @@ fn a_file_that_was_not_loaded_is_kept_unless_the_user_says_overwrite() {
     until(&mut window, "refusal", |s| s["message"].as_str().is_some_and(|m| m.contains(file.name())));
     let ask = |window: &mut Window| {
         click(window, "Save");
-        until(window, "the question", |s| s["message"].as_str().is_some_and(|m| m.contains("not replaced")));
-        window.step();
-        window.get_by_label(&format!("Overwrite {}?", file.name()));
+        until(window, "the question", |s| s["question"] == "overwrite");
+        window.run_steps(2);
+        window.get_by_label(&format!("There is already a file {}.", file.name()));
     };
     ask(&mut window);
-    click(&mut window, "Keep");
-    assert!(window.query_by_label("Overwrite").is_none());
+    click(&mut window, "Cancel");
+    assert!(window.query_by_label("Replace it").is_none());
     assert_eq!(content(), precious);
     click(&mut window, "Reset weights");
     ask(&mut window);
     assert_eq!(content(), precious);
-    click(&mut window, "Overwrite");
+    click(&mut window, "Replace it");
     until(&mut window, "saving", |s| s["message"].as_str().is_some_and(|m| m.starts_with("Saved")));
     assert_eq!(Model::from_toml(&content(), "saved").unwrap().name, "Test robot");
     enter(&mut window, "velocity weight", "3");

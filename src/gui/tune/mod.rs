@@ -14,7 +14,7 @@ mod trials;
 mod verdict;
 mod weights;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use egui::{CentralPanel, Frame, Margin, Panel, Ui};
 
@@ -81,10 +81,6 @@ impl TuneTab {
 
     pub(crate) fn note_file_problem(&mut self, problem: &str) {
         self.files.problem = Some(problem.to_owned());
-    }
-
-    pub(crate) fn ask_to_overwrite(&mut self, path: PathBuf) {
-        self.files.overwrite = Some(path);
     }
 
     pub(crate) fn note_saved(&mut self, path: &Path) {

@@ -7,20 +7,18 @@ use flqr_core::model_file::presets;
 
 use crate::command::{Command, FilePurpose};
 use crate::context::ViewContext;
-use crate::widgets::{error_ui, section_ui, warning_ui};
+use crate::widgets::{error_ui, section_ui};
 
 /// State of the file controls.
 pub(super) struct ModelFiles {
     path: String,
     pub(super) problem: Option<String>,
-    /// An existing file that Save was asked to replace.
-    pub(super) overwrite: Option<PathBuf>,
 }
 
 impl ModelFiles {
     pub(super) fn new(path: Option<&Path>) -> Self {
         let path = path.map(|path| path.display().to_string()).unwrap_or_default();
-        Self { path, problem: None, overwrite: None }
+        Self { path, problem: None }
     }
 
     pub(super) fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
@@ -40,29 +38,10 @@ impl ModelFiles {
             .desired_width(f32::INFINITY);
         let field = ui.add(field).accessible_name("model path");
         let entered = field.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
-        if field.changed() {
-            self.overwrite = None;
-        }
         field.on_hover_text("Type a path and press Enter to load it");
         ui.horizontal(|ui| self.buttons_ui(context, ui, entered));
         if let Some(problem) = &self.problem {
             error_ui(ui, problem);
-        }
-        self.overwrite_ui(context, ui);
-    }
-
-    /// The question before a file is replaced that is not the loaded one.
-    fn overwrite_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
-        let Some(path) = self.overwrite.take() else { return };
-        warning_ui(ui, format!("Overwrite {}?", path.display()));
-        let answer = ui.horizontal(|ui| {
-            let overwrite = ui.button("Overwrite").on_hover_text("Replace the file with the model of now");
-            (overwrite.clicked(), ui.button("Keep").on_hover_text("Leave the file as it is").clicked())
-        });
-        match answer.inner {
-            (true, _) => context.commands.send(Command::OverwriteModel(path)),
-            (_, true) => {}
-            _ => self.overwrite = Some(path),
         }
     }
 
@@ -75,13 +54,11 @@ impl ModelFiles {
         let load = ui.add_enabled(typed, egui::Button::new("Load")).on_hover_text("Load the path above");
         if load.clicked() || (entered && typed) {
             self.problem = None;
-            self.overwrite = None;
             context.commands.send(Command::LoadModel(path.clone()));
         }
         let save = ui.add_enabled(typed, egui::Button::new("Save"));
         if save.on_hover_text("Save to the path above; a file other than the loaded one is replaced only after a question. Ctrl+S saves to the loaded file").clicked() {
             self.problem = None;
-            self.overwrite = None;
             context.commands.send(Command::SaveModel(path));
         }
         if ui.button("Save as…").on_hover_text("Choose where to save").clicked() {
