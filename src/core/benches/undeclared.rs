@@ -3,7 +3,7 @@
 //! `cargo bench -p flqr-core --bench undeclared -- [family…] [--first ROUND] [--rounds N] [--noise FACTOR]
 //! [--seconds LENGTH] [--alone] [--verbose]`;
 //! families: clean, tolerance, single, quarter, pairs, outside, the same of a motor on a bench behind `bench-` (`bench` for
-//! all of those), or the id of an effect. Rounds 0 to 29 are those that were looked at while the method was made; figures
+//! all of those), the id of an effect, or the generator's name of one. Rounds 0 to 29 are those that were looked at while the method was made; figures
 //! are told from round 30 on. `--seconds` makes logs of that length without another log beside them, so that the last
 //! third is held out; `--alone` judges one case at a time, which is what its time is to be measured with.
 
@@ -136,7 +136,12 @@ impl Wanted {
         let mut list = Vec::new();
         let mut add = |family: &'static str, case: Trial| {
             let rig = family.split_once('-').map(|(rig, _)| rig);
-            let wanted = |w: &String| w == family || *w == case.name || Some(w.as_str()) == rig;
+            let wanted = |w: &String| {
+                w == family
+                    || *w == case.name
+                    || Some(w.as_str()) == rig
+                    || case.faults[1..].starts_with(w.as_str())
+            };
             if self.families.is_empty() || self.families.iter().any(wanted) {
                 list.push((family, case));
             }
@@ -144,7 +149,7 @@ impl Wanted {
         for round in self.first..self.first + self.rounds {
             for seed in CLEAN * round..CLEAN * (round + 1) {
                 add("clean", cases::clean(seed, 0.0).into());
-                add("tolerance", cases::clean(1000 + seed, 0.01).into());
+                add("tolerance", cases::clean(1000 + seed, 1.0).into());
                 add("bench-clean", BenchCase::clean(seed, 0.0).into());
                 add("bench-tolerance", BenchCase::clean(1000 + seed, 0.01).into());
             }

@@ -114,8 +114,8 @@ fn sizes_are_in_their_intervals() {
 
 #[test]
 fn a_clean_robot_lacks_nothing_and_gives_the_same_answer_again() {
-    for tolerance in [0.0, 0.01] {
-        let case = cases::clean(2, tolerance);
+    for share in [0.0, 1.0] {
+        let case = cases::clean(2, share);
         let log = log(&case);
         let found = refined(&case, log.clone());
         assert_eq!(
@@ -133,11 +133,16 @@ fn a_clean_robot_lacks_nothing_and_gives_the_same_answer_again() {
 #[test]
 fn clean_robots_lack_nothing_however_strong_their_noise() {
     for noise in [0.5, 2.0] {
-        for (seed, tolerance) in [(11, 0.0), (12, 0.01)] {
-            let case = cases::clean(seed, tolerance);
+        for (seed, share) in [(11, 0.0), (12, 1.0)] {
+            let case = cases::clean(seed, share);
             let recording = case.record(false, Conditions { noise, ..SHORT }).unwrap();
             let found = refined(&case, Log::from_columns("clean", recording));
-            assert_eq!((found.verdict, ids(&found)), (Verdict::ModelAdequate, vec![]), "noise × {noise}");
+            assert_eq!(
+                (found.verdict, ids(&found)),
+                (Verdict::ModelAdequate, vec![]),
+                "noise × {noise}, share {share}: {}",
+                found.unexplained.description
+            );
         }
     }
 }

@@ -42,6 +42,18 @@ pub(crate) struct Body {
     pub(crate) cost: ([f64; 4], f64),
 }
 
+/// Shares of themselves by which the numbers of a robot may be off.
+pub(crate) struct Tolerances {
+    pub(crate) masses: f64,
+    pub(crate) lengths: f64,
+    pub(crate) inertias: f64,
+    pub(crate) friction: f64,
+}
+
+/// What the model files of the cases say: a scale, a rule, and a friction curve that was measured once.
+pub(crate) const TOLERANCES: Tolerances =
+    Tolerances { masses: 0.01, lengths: 0.005, inertias: 0.02, friction: 0.1 };
+
 /// The robots of the cases.
 pub(crate) const BODIES: [Body; 4] = [
     Body {
@@ -91,18 +103,20 @@ pub(crate) const BODIES: [Body; 4] = [
 ];
 
 impl Body {
-    /// The same robot, every number off by up to `share`, its height by half of that.
+    /// The same robot, every number off by up to a `share` of its tolerance.
     pub(crate) fn jittered(mut self, share: f64, random: &mut Random) -> Self {
-        let mut off = |value: &mut f64, share: f64| *value *= 1.0 + random.between(-share, share);
-        off(&mut self.mass, share);
-        off(&mut self.wheel, share);
-        off(&mut self.wheel_inertia, share);
-        off(&mut self.height, 0.5 * share);
-        off(&mut self.inertia, share);
+        let mut off = |value: &mut f64, tolerance: f64| {
+            *value *= 1.0 + random.between(-share * tolerance, share * tolerance);
+        };
+        off(&mut self.mass, TOLERANCES.masses);
+        off(&mut self.wheel, TOLERANCES.masses);
+        off(&mut self.wheel_inertia, TOLERANCES.inertias);
+        off(&mut self.height, TOLERANCES.lengths);
+        off(&mut self.inertia, TOLERANCES.inertias);
         for motor in &mut self.motors {
-            off(&mut motor.coulomb, share);
-            off(&mut motor.standing, share);
-            off(&mut motor.viscous, share);
+            off(&mut motor.coulomb, TOLERANCES.friction);
+            off(&mut motor.standing, TOLERANCES.friction);
+            off(&mut motor.viscous, TOLERANCES.friction);
         }
         self
     }

@@ -97,11 +97,11 @@ pub(crate) fn outside(kind: usize, random: &mut Random) -> Fault {
 /// Kinds of [`outside`].
 pub(crate) const OUTSIDE: usize = 13;
 
-/// A robot and its declaration, off by `tolerance` (1 for the declared tolerances' scale of one percent).
-fn start(seed: u64, tolerance: f64) -> (Random, Body, Body) {
+/// A robot and its declaration, off by up to a share of its tolerances.
+fn start(seed: u64, share: f64) -> (Random, Body, Body) {
     let mut random = Random::new(seed.wrapping_mul(7919).wrapping_add(17));
     let declared = BODIES[(seed % 4) as usize];
-    let body = declared.jittered(tolerance, &mut random);
+    let body = declared.jittered(share, &mut random);
     (random, declared, body)
 }
 
@@ -109,9 +109,9 @@ fn case(name: String, seed: u64, declared: Body, body: Body, faults: Vec<Fault>)
     Case { name, seed, declared, body, faults }
 }
 
-/// A robot as declared, within `tolerance`.
-pub(crate) fn clean(seed: u64, tolerance: f64) -> Case {
-    let (_, declared, body) = start(seed, tolerance);
+/// A robot as declared, within a share of its tolerances.
+pub(crate) fn clean(seed: u64, share: f64) -> Case {
+    let (_, declared, body) = start(seed, share);
     case("clean".into(), seed, declared, body, Vec::new())
 }
 

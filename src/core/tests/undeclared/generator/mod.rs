@@ -10,7 +10,7 @@ pub(crate) mod fault;
 mod random;
 pub(crate) mod robot_run;
 
-use body::Body;
+use body::{Body, TOLERANCES, Tolerances};
 pub(crate) use cases::Case;
 pub(crate) use robot_run::Conditions;
 use robot_run::{Recording, run};
@@ -40,6 +40,10 @@ impl Body {
                 motor.coulomb, motor.standing, motor.viscous, motor.knee, motor.shape, motor.offset
             );
         }
+        let Tolerances { masses, lengths, inertias, friction } = TOLERANCES;
+        text += &format!(
+            "[tolerance]\nmasses = {masses}\nlengths = {lengths}\ninertias = {inertias}\nfriction = {friction}\n"
+        );
         let (q, r) = self.cost;
         text + &format!("[lqr]\nq_diagonal = {q:?}\nr_diagonal = [{r:?}, {r:?}]\n")
     }

@@ -289,8 +289,10 @@ fn through_actuator(faults: &[Fault], memory: &mut [[Memory; 2]], motor: usize, 
                 (1.0 - part) * back(whole) + part * back(whole + 1.0)
             }
             Fault::Lag { seconds } => {
-                memory.lagged += (1.0 - (-TICK / seconds).exp()) * (acts - memory.lagged);
-                memory.lagged
+                // What is asked for holds for a tick, over which the mean acts.
+                let (before, faded) = (memory.lagged - acts, (-TICK / seconds).exp());
+                memory.lagged = acts + before * faded;
+                acts + before * (1.0 - faded) * seconds / TICK
             }
             Fault::Gain { share } => acts * (1.0 + share),
             Fault::Saturation { nm } => acts.clamp(-nm, nm),
