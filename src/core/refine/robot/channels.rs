@@ -2,18 +2,25 @@
 //!
 //! The gyro's noise enters r1 and r2 by way of θ̈ in one fixed ratio; c = r1 − κ r2 is free of it, and white like the
 //! random forces that every robot feels. b = r2 + β c is what of r2 is independent of c. Each is made white by its own
-//! filter, from a spectrum in which the lowest frequencies, where effects sit, are taken to be as strong as those above:
-//! structure stays visible as variance above 1.
+//! filter, from a spectrum in which the lowest frequencies, where effects sit, are taken to be as strong as those above,
+//! and lines as strong as what is beside them: structure stays visible as variance above 1.
 
 use std::f64::consts::TAU;
 
+use super::candidates::quantile;
 use super::trace::{Pair, Part, Trace};
 
 const ORDER: usize = 10;
+/// Beginning of a log that is not used, s: what friction held before it, and how the robot moved, nobody knows.
+const BEGINNING_S: f64 = 0.5;
 /// Rows of one piece of the spectrum.
 const PIECE: usize = 512;
 /// Band whose level is taken for all that is below it, Hz.
 const BAND_HZ: [f64; 2] = [3.0, 8.0];
+/// Noise is smooth over the frequency: what is beyond the median of its neighbours, so far on both sides, Hz, by so many
+/// standard deviations of a mean over pieces, is a line that something draws.
+const NEIGHBOURS_HZ: f64 = 3.0;
+const LINE: f64 = 5.0;
 
 /// From r1 and r2 to white rows.
 pub(super) struct Channels {
@@ -55,13 +62,16 @@ impl Channels {
         let beta = kappa * second / (first + kappa * kappa * second);
         let mixed = mixed(left, kappa, beta);
         let mut spectra = [density(&mixed[0]), density(&mixed[1]), spectra[0].clone(), spectra[1].clone()];
-        spectra.iter_mut().for_each(Spectrum::flatten_below);
+        spectra.iter_mut().for_each(Spectrum::leave_noise);
         let floors = [0, 2, 3].map(|i: usize| spectra[i].correlation(0).sqrt());
         let filters = [0, 1].map(|i: usize| Filter::new(&spectra[i]));
-        let rows = runs.iter().flat_map(|run| run.iter().copied().skip(ORDER)).collect();
+        let beginning = ORDER.max((BEGINNING_S / step_s) as usize);
+        let rows = runs.iter().flat_map(|run| run.iter().copied().skip(beginning)).collect();
         let unseen = |run: super::trace::Run| {
             let start = run.rows.start;
-            run.rows.filter(|&row| parts[row] == Part::HeldOut && row >= start + ORDER).collect::<Vec<_>>()
+            run.rows
+                .filter(|&row| parts[row] == Part::HeldOut && row >= start + beginning)
+                .collect::<Vec<_>>()
         };
         let held_out = trace.runs().into_iter().flat_map(unseen).collect();
         Self { kappa, beta, filters, floors, rows, held_out }
@@ -140,6 +150,7 @@ impl Filter {
 struct Spectrum {
     power: Vec<f64>,
     step_s: f64,
+    pieces: f64,
 }
 
 impl Spectrum {
@@ -168,8 +179,9 @@ impl Spectrum {
                 count += 1.0;
             }
         }
-        power.iter_mut().for_each(|power| *power = (*power / f64::max(count, 1.0)).max(1e-300));
-        Self { power, step_s }
+        let pieces = f64::max(count, 1.0);
+        power.iter_mut().for_each(|power| *power = (*power / pieces).max(1e-300));
+        Self { power, step_s, pieces }
     }
 
     fn hz(&self, place: usize) -> f64 {
@@ -184,13 +196,37 @@ impl Spectrum {
         if inside.is_empty() { self.power[0] } else { inside.iter().sum::<f64>() / inside.len() as f64 }
     }
 
-    fn flatten_below(&mut self) {
-        let level = self.level(BAND_HZ);
-        for place in 0..self.power.len() {
-            if self.hz(place) < BAND_HZ[0] {
-                self.power[place] = level;
+    /// Multiple of the noise from which on there is a line.
+    fn line(&self) -> f64 {
+        1.0 + LINE / self.pieces.sqrt()
+    }
+
+    /// Mean level between two frequencies of what is no line.
+    fn level_without_lines(&self, band: [f64; 2]) -> f64 {
+        let inside = || {
+            let places = (0..self.power.len()).filter(|&place| (band[0]..=band[1]).contains(&self.hz(place)));
+            places.map(|place| self.power[place])
+        };
+        let most = self.line() * quantile(&inside().collect::<Vec<_>>(), 0.5);
+        let (sum, count) = inside()
+            .filter(|power| *power <= most)
+            .fold((0.0, 0.0), |(sum, count), power| (sum + power, count + 1.0));
+        sum / f64::max(count, 1.0)
+    }
+
+    /// Takes out what is not noise.
+    fn leave_noise(&mut self) {
+        let beside = |hz: f64| [(hz - NEIGHBOURS_HZ).max(BAND_HZ[0]), hz + NEIGHBOURS_HZ];
+        let low = self.level_without_lines(BAND_HZ);
+        let noise = |place: usize| {
+            let hz = self.hz(place);
+            if hz < BAND_HZ[0] {
+                return low;
             }
-        }
+            let level = self.level_without_lines(beside(hz));
+            if self.power[place] > self.line() * level { level } else { self.power[place] }
+        };
+        self.power = (0..self.power.len()).map(noise).collect();
     }
 
     fn correlation(&self, lag: usize) -> f64 {
