@@ -21,12 +21,14 @@ const OF_A_SHAPE: f64 = 2.0;
 pub(in crate::refine::robot) const LEAST_Z: f64 = 3.0;
 const SURE_Z: f64 = 6.0;
 /// Least impulse of a push as a share of the weight, s: sticking that lets go looks like a smaller one.
-const LEAST_IMPULSE_S: f64 = 0.003;
+const LEAST_IMPULSE_S: f64 = 0.0025;
 /// Time within which pushes are one, s, and the share of their gain that the strongest must have alone.
 const ONE_PUSH_S: f64 = 1.5;
 const MOST_OF_A_PUSH: f64 = 0.9;
 /// Most effects that are named.
 const MOST: usize = 6;
+/// Most looks for another one.
+const MOST_LOOKS: usize = 2 * MOST;
 /// Candidates whose shapes are refined and whose left-out error is worked out.
 const SHORT_LIST: usize = 14;
 const REFINED: usize = 5;
@@ -71,8 +73,12 @@ impl Search<'_> {
         watch: &mut dyn FnMut(f64) -> Result<(), RefineError>,
     ) -> Result<(), RefineError> {
         let Some(mut now) = self.fit(&[]) else { return Ok(()) };
-        while self.picks.len() < MOST {
-            watch(self.picks.len() as f64 / MOST as f64)?;
+        // A swap may drop what was just added, and so on in a circle: looks are counted.
+        for look in 0..MOST_LOOKS {
+            watch(look as f64 / MOST_LOOKS as f64)?;
+            if self.picks.len() >= MOST {
+                break;
+            }
             let ranked = self.ranked(&self.picks, &now);
             if self.picks.is_empty() {
                 self.tried.clone_from(&ranked);
