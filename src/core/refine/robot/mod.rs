@@ -169,6 +169,7 @@ pub(super) fn refine(
             search.simplify();
             search.merge_pushes();
             search.confirm();
+            search.polish();
         }
         let Some(fit) = search.fit(&search.picks) else { return Ok(Refinement::unfit(model, data_health)) };
         if search.picks.is_empty() {
@@ -235,9 +236,8 @@ fn unbiased(search: &Search<'_>, mut fit: Fit, known: Known<'_>, seed: u64) -> F
     if search.picks.is_empty() || !search.picks.iter().all(is_simulated) {
         return fit;
     }
-    let corrections: Vec<(&Nuisance, f64)> =
-        search.nuisances.iter().zip(fit.judged.coefficients.iter().copied()).collect();
-    let shifts = twin(search.trace, known, search.channels, &corrections, seed).and_then(|(twin, levels)| {
+    // As declared: a log's own corrections would be drawn to what is declared a second time.
+    let shifts = twin(search.trace, known, search.channels, &[], seed).and_then(|(twin, levels)| {
         bias::shifts(search, &fit, &twin.with(found::laws(search, &fit))?, levels, seed)
     });
     let first = search.nuisances.len();

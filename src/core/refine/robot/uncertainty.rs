@@ -10,7 +10,7 @@ use crate::refine::select::Member;
 
 use super::candidates::Candidate;
 use super::kernel::dot;
-use super::search::{Fit, Search};
+use super::search::{Fit, FreeShape, Search};
 
 /// Standard errors.
 pub(super) struct Uncertainty {
@@ -20,22 +20,15 @@ pub(super) struct Uncertainty {
     pub(super) shapes: Vec<Vec<Option<f64>>>,
 }
 
-/// A shape that is free: whose, which, and its column.
-struct Free {
-    pick: usize,
-    place: usize,
-    column: Vec<f64>,
-}
-
 impl Uncertainty {
     pub(super) fn new(search: &Search<'_>, picks: &[Candidate], fit: &Fit) -> Self {
-        let free = free_shapes(search, picks, fit);
+        let free = search.free_shapes(picks, fit);
         let own = fit.members.len();
         let mut members = fit.members.clone();
         for (pick, first) in search.placed(picks) {
             // Of one without an amplitude the shape is the size.
-            if pick.is_fixed() && !pick.is_sized() && free.iter().any(|f| std::ptr::eq(&picks[f.pick], pick))
-            {
+            let is_of = |shape: &FreeShape| std::ptr::eq(&picks[shape.pick], pick);
+            if pick.is_fixed() && !pick.is_sized() && free.iter().any(is_of) {
                 members[first].bounds = [1.0, 1.0];
             }
         }
@@ -53,34 +46,6 @@ impl Uncertainty {
             (0..own).map(|i| errors[i].max(fit.judged.standard_error(i)).hypot(fit.doubt[i])).collect();
         Self { sizes, shapes }
     }
-}
-
-fn free_shapes(search: &Search<'_>, picks: &[Candidate], fit: &Fit) -> Vec<Free> {
-    let height_m = search.trace.machine.parameters.com_height_m;
-    let mut found = Vec::new();
-    for (pick, (candidate, first)) in search.placed(picks).into_iter().enumerate() {
-        if candidate.kind.trial.brief {
-            continue;
-        }
-        let sizes = &fit.judged.coefficients[first..first + candidate.white.len()];
-        for (place, step) in candidate.moves(height_m).into_iter().enumerate() {
-            let Some(step) = step.filter(|_| !(place == 0 && candidate.is_sized())) else { continue };
-            let at = |direction: f64| {
-                let mut shape = candidate.shape.clone();
-                shape[place] = step.half().half().from(shape[place], direction);
-                search.moved(candidate, shape)
-            };
-            let (Some(up), Some(down)) = (at(1.0), at(-1.0)) else { continue };
-            let way = up.shape[place] - down.shape[place];
-            let mut column = vec![0.0; search.rows()];
-            for ((up, down), size) in up.white.iter().zip(&down.white).zip(sizes) {
-                let rows = column.iter_mut().zip(up.iter().zip(down));
-                rows.for_each(|(sum, (up, down))| *sum += size * (up - down) / way);
-            }
-            found.push(Free { pick, place, column });
-        }
-    }
-    found
 }
 
 /// Standard errors of the members' coefficients; none where they depend on each other.

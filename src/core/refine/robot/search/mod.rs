@@ -15,6 +15,7 @@ use crate::refine::select::{Blocks, Judged, Member};
 
 pub(super) use screen::Screen;
 pub(super) use selection::LEAST_Z;
+pub(super) use shapes::FreeShape;
 
 use super::candidates::Candidate;
 use super::channels::Channels;
