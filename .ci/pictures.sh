@@ -58,6 +58,12 @@ xdotool key Return
 until_state 60 "the log is loaded" '.friction_tab.log.rows > 0'
 xdotool key ctrl+Return
 until_state 180 "the fit has parameters" '.friction_tab.fit.parameters | length > 0'
+# A picture says nothing of the machine that it was made on.
+xdotool key ctrl+l
+sleep 0.5
+xdotool key ctrl+a
+xdotool type --delay 15 "sweep.csv"
+xdotool key Tab
 both friction
 
 xdotool key ctrl+4

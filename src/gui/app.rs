@@ -397,6 +397,11 @@ impl App {
                 Err(problem) => self.fail(problem),
             }
         }
+        if let Some((path, model)) = self.refine.take_saved_model()
+            && model == self.session.model()
+        {
+            self.note_saved(keep::absolute(path), self.session.clone());
+        }
         if let Some(job) = &mut self.recent_job {
             match job.poll().1 {
                 Outcome::Running => {}
@@ -437,7 +442,11 @@ impl App {
             Answer::Chosen(path) => self.commands.send(apply::chosen(purpose, path)),
             Answer::Cancelled => {}
             Answer::Unavailable(problem) => {
-                self.fail(problem.clone());
+                match purpose {
+                    // Its form says it, where the path is to be typed.
+                    FilePurpose::SaveFigure(_) => {}
+                    _ => self.fail(problem.clone()),
+                }
                 if asks_path {
                     self.ask_path(purpose, Some(problem.clone()));
                 }

@@ -42,7 +42,7 @@ pub(crate) fn findings_ui<'a>(findings: impl IntoIterator<Item = &'a HealthFindi
     let colors = palette(ui.visuals());
     for finding in findings {
         let (mark, color) = match finding.severity {
-            Severity::Info => ("note", colors.measured),
+            Severity::Info => ("note", colors.reference),
             Severity::Warning => ("warning", colors.warning),
             Severity::Error => ("error", colors.error),
         };

@@ -155,7 +155,30 @@ pub(crate) fn load(
     let reader = BufReader::with_capacity(1 << 16, file);
     let log =
         read_log(reader, &source, &ReadOptions::new(map), &mut watch).map_err(|error| error.to_string())?;
+    if let Some(why) = no_log(&log) {
+        return Err(format!(
+            "{source} is no log: {why}; choose a CSV file with a row of names and rows of numbers"
+        ));
+    }
     Ok(Box::new(LoadedLog::new(log, path, generation)))
+}
+
+/// Why a file is no log but some other text. A table of unknown columns is one: a column map can name them.
+fn no_log(log: &Log) -> Option<String> {
+    let Err(missing) = log.kind() else { return None };
+    let (rows, dropped) = (log.rows(), log.dropped_rows);
+    let cells = log.columns.iter().flat_map(|column| &column.values);
+    let (count, numbers) =
+        cells.fold((0, 0), |(count, numbers), value| (count + 1, numbers + usize::from(value.is_finite())));
+    match () {
+        () if rows == 0 => Some("it has no row of numbers".to_owned()),
+        () if dropped > rows => {
+            Some(format!("{dropped} of its {} lines are no rows of numbers", rows + dropped))
+        }
+        () if 2 * numbers < count => Some(format!("{numbers} of its {count} cells are numbers")),
+        () if log.columns.len() < 2 => Some(missing.to_string()),
+        () => None,
+    }
 }
 
 impl LoadedLog {

@@ -94,11 +94,18 @@ pub(crate) struct SaveForm<K> {
     path: String,
     writing: Option<Writing<K>>,
     overwrite: Option<Overwrite<K>>,
+    /// What was written last, and where to.
+    written: Option<(K, PathBuf)>,
 }
 
 impl<K: FileKind> SaveForm<K> {
     pub(crate) fn is_busy(&self) -> bool {
         self.writing.is_some()
+    }
+
+    /// What has been written since this was asked last.
+    pub(crate) fn take_written(&mut self) -> Option<(K, PathBuf)> {
+        self.written.take()
     }
 
     /// Takes note of what is to be saved; the path with its ending.
@@ -140,6 +147,7 @@ impl<K: FileKind> SaveForm<K> {
         let Writing { kind, path, remark, .. } = self.writing.take()?;
         Some(match result {
             Ok(Saved::Written(paths)) => {
+                self.written = Some((kind, path));
                 let remark = remark.map(|remark| format!(" {remark}")).unwrap_or_default();
                 Ok(format!("Saved {}.{remark}", listed(&paths)))
             }

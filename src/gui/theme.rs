@@ -32,7 +32,7 @@ const DARK: Palette = Palette {
         Color32::from_rgb(245, 178, 92),
     ],
     runs: [Color32::from_rgb(92, 184, 238), Color32::from_rgb(242, 149, 90)],
-    measured: Color32::from_rgb(170, 178, 192),
+    measured: Color32::from_rgb(227, 156, 203),
     good: Color32::from_rgb(92, 208, 158),
     warning: Color32::from_rgb(245, 186, 92),
     error: Color32::from_rgb(255, 122, 112),
@@ -43,11 +43,14 @@ const LIGHT: Palette = Palette {
     reference: Color32::from_rgb(130, 136, 148),
     channels: [Color32::from_rgb(18, 96, 200), Color32::from_rgb(14, 128, 84), Color32::from_rgb(186, 98, 8)],
     runs: [Color32::from_rgb(0, 114, 178), Color32::from_rgb(213, 94, 0)],
-    measured: Color32::from_rgb(96, 104, 118),
+    measured: Color32::from_rgb(176, 87, 143),
     good: Color32::from_rgb(14, 128, 84),
     warning: Color32::from_rgb(164, 92, 0),
     error: Color32::from_rgb(196, 40, 36),
 };
+
+/// Width of a scroll bar.
+const SCROLL_BAR: f32 = 8.0;
 
 /// The colours of the present theme.
 pub(crate) fn palette(visuals: &Visuals) -> Palette {
@@ -65,6 +68,9 @@ pub(crate) fn apply(ctx: &Context) {
         style.spacing.interact_size.y = 22.0;
         style.spacing.slider_width = 96.0;
         style.spacing.combo_width = 60.0;
+        // Bars have room of their own, so that they never lie over what they scroll.
+        style.spacing.scroll.floating_allocated_width = SCROLL_BAR;
+        style.spacing.scroll.bar_width = SCROLL_BAR;
         style.text_styles.insert(TextStyle::Heading, FontId::new(14.5, FontFamily::Proportional));
         style.text_styles.insert(TextStyle::Body, FontId::new(13.0, FontFamily::Proportional));
         style.text_styles.insert(TextStyle::Button, FontId::new(13.0, FontFamily::Proportional));

@@ -131,7 +131,7 @@ fn figure(chart: &Chart, number: usize, markup: &mut Markup) {
             markup.text_element("span", &[], &chart.description);
         });
         for (name, width) in [("wide", svg::WIDE), ("narrow", svg::NARROW)] {
-            svg::draw(chart, width, name, &format!("chart-{number}-{name}"), None, markup);
+            svg::draw(chart, width, name, &format!("chart-{number}-{name}"), markup);
         }
     });
 }

@@ -2,6 +2,8 @@
 
 use std::fmt::Display;
 
+use super::looks::Looks;
+
 /// An attribute of an element.
 pub(super) type Attribute<'a> = (&'a str, &'a dyn Display);
 
@@ -9,9 +11,16 @@ pub(super) type Attribute<'a> = (&'a str, &'a dyn Display);
 #[derive(Default)]
 pub(super) struct Markup {
     out: String,
+    /// Given to every element as attributes.
+    looks: Option<Looks>,
 }
 
 impl Markup {
+    /// Markup whose elements have their looks with them.
+    pub(super) fn with_looks(looks: Looks) -> Self {
+        Self { out: String::new(), looks: Some(looks) }
+    }
+
     pub(super) fn into_string(self) -> String {
         self.out
     }
@@ -60,12 +69,23 @@ impl Markup {
         self.out.push('<');
         self.out.push_str(name);
         for (key, value) in attributes {
-            self.out.push(' ');
-            self.out.push_str(key);
-            self.out.push_str("=\"");
-            escape(&value.to_string(), &mut self.out);
-            self.out.push('"');
+            self.attribute(key, &value.to_string());
         }
+        if let Some(looks) = &self.looks {
+            let classes = attributes.iter().find(|(key, _)| *key == "class");
+            let classes = classes.map(|(_, classes)| classes.to_string()).unwrap_or_default();
+            for (key, value) in looks.of(name, &classes) {
+                self.attribute(key, &value);
+            }
+        }
+    }
+
+    fn attribute(&mut self, key: &str, value: &str) {
+        self.out.push(' ');
+        self.out.push_str(key);
+        self.out.push_str("=\"");
+        escape(value, &mut self.out);
+        self.out.push('"');
     }
 }
 

@@ -7,6 +7,7 @@
 
 mod chart;
 mod html;
+mod looks;
 mod map;
 mod markup;
 pub mod number;
@@ -115,7 +116,7 @@ impl Document {
 }
 
 impl Chart {
-    /// The chart as a picture of its own, light or dark as its surroundings ask for.
+    /// The chart as a picture of its own on white, for any program that draws SVG.
     pub fn to_svg(&self) -> String {
         svg::picture(self, [svg::WIDE, f64::NAN])
     }

@@ -6,8 +6,9 @@
 use std::fmt;
 
 use super::chart::{Chart, Mark, Panel, Series, extent};
+use super::looks::Looks;
 use super::map::{Map, along};
-use super::markup::Markup;
+use super::markup::{Attribute, Markup};
 use super::path::{Px, dots, polyline, stairs};
 use super::thin;
 use super::ticks::Tick;
@@ -38,63 +39,49 @@ const TINTS: usize = 3;
 
 /// A file of its own, of a width and a height; NaN for the usual ones.
 pub(super) fn picture(chart: &Chart, [width, height]: [f64; 2]) -> String {
-    let mut markup = Markup::default();
+    let mut markup = Markup::with_looks(Looks::of_sheet(STYLE));
     let width = if width.is_finite() { width.clamp(SMALLEST, LARGEST) } else { WIDE };
     let mut layout = Layout::new(chart, width);
     if height.is_finite() {
         layout.stretch(chart, height.min(LARGEST));
     }
-    draw_layout(chart, &layout, "wide", "chart", Some(STYLE), &mut markup);
+    draw_layout(chart, &layout, "wide", "chart", true, &mut markup);
     markup.into_string()
 }
 
-/// The chart, `width` px wide, of class `name`. `id` is unique in its document. `style` goes into it, where the
-/// document has none.
-pub(super) fn draw(
-    chart: &Chart,
-    width: f64,
-    name: &str,
-    id: &str,
-    style: Option<&str>,
-    markup: &mut Markup,
-) {
-    draw_layout(chart, &Layout::new(chart, width), name, id, style, markup);
+/// The chart, `width` px wide, of class `name`, in a document that has the style. `id` is unique in it.
+pub(super) fn draw(chart: &Chart, width: f64, name: &str, id: &str, markup: &mut Markup) {
+    draw_layout(chart, &Layout::new(chart, width), name, id, false, markup);
 }
 
-fn draw_layout(
-    chart: &Chart,
-    layout: &Layout,
-    name: &str,
-    id: &str,
-    style: Option<&str>,
-    markup: &mut Markup,
-) {
+fn draw_layout(chart: &Chart, layout: &Layout, name: &str, id: &str, alone: bool, markup: &mut Markup) {
     let width = layout.width;
     let [title, description] = ["title", "text"].map(|part| format!("{id}-{part}"));
     let names = format!("{title} {description}");
-    let view = format!("0 0 {} {}", Px(width), Px(layout.height));
-    markup.element(
-        "svg",
-        &[
-            ("xmlns", &"http://www.w3.org/2000/svg"),
-            ("class", &format!("chart {name}")),
-            ("viewBox", &view),
-            ("role", &"img"),
-            ("aria-labelledby", &names),
-        ],
-        |markup| {
-            markup.text_element("title", &[("id", &title)], &chart.title);
-            markup.text_element("desc", &[("id", &description)], &chart.description);
-            if let Some(style) = style {
-                markup.text_element("style", &[], style);
-            }
-            layout.legend(markup);
-            for (panel, place) in chart.panels.iter().zip(&layout.panels) {
-                layout.panel(panel, place, markup);
-            }
-            layout.x_axis(chart, markup);
-        },
-    );
+    let [wide, high] = [Px(width), Px(layout.height)];
+    let (view, class) = (format!("0 0 {wide} {high}"), format!("chart {name}"));
+    let mut attributes: Vec<Attribute<'_>> = vec![
+        ("xmlns", &"http://www.w3.org/2000/svg"),
+        ("class", &class),
+        ("viewBox", &view),
+        ("role", &"img"),
+        ("aria-labelledby", &names),
+    ];
+    if alone {
+        attributes.extend([("width", &wide as &dyn fmt::Display), ("height", &high)]);
+    }
+    markup.element("svg", &attributes, |markup| {
+        markup.text_element("title", &[("id", &title)], &chart.title);
+        markup.text_element("desc", &[("id", &description)], &chart.description);
+        if alone {
+            markup.leaf("rect", &[("width", &wide), ("height", &high), ("fill", &"#ffffff")]);
+        }
+        layout.legend(markup);
+        for (panel, place) in chart.panels.iter().zip(&layout.panels) {
+            layout.panel(panel, place, markup);
+        }
+        layout.x_axis(chart, markup);
+    });
 }
 
 struct Layout {

@@ -156,6 +156,50 @@ fn a_picture_has_the_size_that_is_asked_for_as_far_as_its_texts_allow() {
     assert!(size([f64::NAN, 1e9])[1] <= 10_000.0);
 }
 
+/// Elements with their attributes.
+fn elements(svg: &str) -> Vec<(String, std::collections::BTreeMap<String, String>)> {
+    let tags = svg.split('<').skip(1).filter(|tag| !tag.starts_with('/'));
+    let parsed = tags.map(|tag| {
+        let tag = tag.split_once('>').expect("a tag ends").0.trim_end_matches('/');
+        let (name, mut rest) = tag.split_once(' ').unwrap_or((tag, ""));
+        let mut attributes = std::collections::BTreeMap::new();
+        while let Some((key, value)) = rest.split_once("=\"") {
+            let (value, behind) = value.split_once('"').expect("a value ends");
+            let before = attributes.insert(key.trim().to_owned(), unescaped(value));
+            assert!(before.is_none(), "{key} twice in {tag}");
+            rest = behind;
+        }
+        (name.to_owned(), attributes)
+    });
+    parsed.collect()
+}
+
+#[test]
+fn a_picture_needs_no_style_sheet() {
+    let svg = chart("plain", wave(500)).to_svg_of([640.0, 480.0]);
+    check_xml(&svg);
+    assert!(!svg.contains("var(") && !svg.contains("<style") && !svg.contains("@media"), "{svg}");
+    let all = elements(&svg);
+    let root = &all[0].1;
+    assert_eq!([&root["width"], &root["height"], &root["font-size"]], ["640", "480", "13px"]);
+    assert_eq!([&root["fill"], &root["viewBox"]], ["#1c2126", "0 0 640 480"]);
+    let is_colour = |value: &String| value.len() == 7 && value.starts_with('#');
+    for (name, has) in &all {
+        let drawn = [has.get("stroke"), has.get("fill")].into_iter().flatten().any(is_colour);
+        assert!(drawn || !["path", "rect"].contains(&name.as_str()), "{name} is not seen: {has:?}");
+        // What is not filled must say so: black is what programs begin with.
+        assert!(name != "path" || has.contains_key("fill"), "{has:?}");
+    }
+    let class = |class: &str| all.iter().find(|(_, has)| has.get("class").is_some_and(|of| of == class));
+    let of = |class_name: &str, key: &str| class(class_name).and_then(|(_, has)| has.get(key)).cloned();
+    assert_eq!(of("line s0", "stroke").as_deref(), Some("#0072b2"));
+    assert_eq!(of("dots s2", "stroke-linecap").as_deref(), Some("round"));
+    assert_eq!(of("limit l0", "stroke-dasharray").as_deref(), Some("8 4"));
+    assert_eq!(of("band b0", "fill-opacity").as_deref(), Some(".08"));
+    assert_eq!(of("ty", "text-anchor").as_deref(), Some("end"));
+    assert_eq!(of("axis tx", "font-weight").as_deref(), Some("600"));
+}
+
 #[test]
 fn reports_are_well_formed_and_say_what_they_are_given() {
     for document in [sample("plain words"), sample(NASTY), Document::default()] {

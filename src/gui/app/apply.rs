@@ -488,7 +488,7 @@ impl App {
         }
     }
 
-    fn note_saved(&mut self, path: PathBuf, session: Session) {
+    pub(super) fn note_saved(&mut self, path: PathBuf, session: Session) {
         self.say(format!("Saved to {}.", path.display()));
         self.saved = session;
         self.recent.note_model(&path);

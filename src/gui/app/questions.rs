@@ -415,7 +415,7 @@ fn overwrite_ui(path: &Path, what: &str, save: &Command, ui: &mut Ui) -> Reply {
 fn changes_ui(changes: &[Change], heads: [&str; 2], ui: &mut Ui) {
     let value = |value: &Option<String>| value.clone().unwrap_or_else(|| "–".to_owned());
     ScrollArea::vertical().max_height(LONGEST_TABLE).show(ui, |ui| {
-        Grid::new("changes").num_columns(3).striped(true).spacing([14.0, 3.0]).show(ui, |ui| {
+        Grid::new("changes").num_columns(3).striped(true).spacing([24.0, 3.0]).show(ui, |ui| {
             for head in ["value", heads[0], heads[1]] {
                 hint_ui(ui, head);
             }

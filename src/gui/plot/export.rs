@@ -103,6 +103,7 @@ pub(super) struct Export {
     pub(super) open: bool,
     pub(super) kind: FigureKind,
     path: String,
+    focus_path: bool,
     size: Option<[f64; 2]>,
     shot: Option<(PathBuf, bool, Vec<String>, Shot)>,
     job: Option<(PathBuf, SaveJob)>,
@@ -143,7 +144,10 @@ impl Export {
                 self.path = full.display().to_string();
                 asked.save = Some((full, replace));
             }
-            Some((_, Err(problem))) => self.problem = Some(problem),
+            Some((kind, Err(problem))) => {
+                (self.open, self.kind, self.focus_path) = (true, kind, true);
+                self.problem = Some(problem);
+            }
             None => {}
         }
         if self.open {
@@ -182,6 +186,9 @@ impl Export {
         let hint = format!("path, .{}", self.kind.extension());
         let field = TextEdit::singleline(&mut self.path).hint_text(hint).desired_width(220.0);
         let field = ui.add(field).accessible_name("figure path");
+        if std::mem::take(&mut self.focus_path) {
+            field.request_focus();
+        }
         let entered = field.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
         if field.changed() {
             (self.problem, self.existing) = (None, None);

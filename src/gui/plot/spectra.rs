@@ -41,11 +41,13 @@ impl Measure {
     }
 }
 
+/// Generation of a curve's data, and the range.
+type Of = (u64, [u64; 2]);
+
 /// The spectrum of one curve, and what it was made of.
 #[derive(Default)]
 struct Entry {
-    /// Generation and range of what was asked for last.
-    of: Option<(u64, [u64; 2])>,
+    of: Option<Of>,
     generation: u64,
     found: Found,
     caches: [DecimationCache; 2],
@@ -60,12 +62,19 @@ struct Found {
     problem: Option<&'static str>,
 }
 
+/// Curves that a worker was given.
+struct SpectraJob {
+    wanted: Vec<(String, Of)>,
+    /// Brings one for each.
+    job: Job<(), Vec<Found>>,
+}
+
 /// Spectra of a stack.
 pub(super) struct Spectra {
     pub(super) measure: Measure,
     view: TimeView,
     entries: BTreeMap<String, Entry>,
-    job: Option<Job<(), Vec<(String, Found)>>>,
+    job: Option<SpectraJob>,
     /// When the job was started.
     started_s: f64,
     problem: Option<String>,
@@ -97,9 +106,10 @@ impl Spectra {
         mut snapshot: impl FnMut(usize) -> Snapshot,
     ) {
         self.drain();
-        let of = |generation: u64| Some((generation, range.map(f64::to_bits)));
+        self.entries.retain(|key, _| curves.iter().any(|(other, _)| other == key));
+        let of = |generation: u64| (generation, range.map(f64::to_bits));
         let is_old = |(key, generation): &(String, u64)| {
-            self.entries.get(key).is_none_or(|entry| entry.of != of(*generation))
+            self.entries.get(key).is_none_or(|entry| entry.of != Some(of(*generation)))
         };
         let old: Vec<usize> = (0..curves.len()).filter(|index| is_old(&curves[*index])).collect();
         if old.is_empty() || self.job.is_some() {
@@ -110,38 +120,35 @@ impl Spectra {
             return ui.ctx().request_repaint_after(std::time::Duration::from_secs_f64(INTERVAL_S));
         }
         self.started_s = now;
-        let mut wanted = Vec::new();
-        for index in old {
-            let (key, generation) = &curves[index];
-            self.entries.entry(key.clone()).or_default().of = of(*generation);
-            wanted.push((key.clone(), snapshot(index)));
-        }
+        let wanted = old.iter().map(|index| (curves[*index].0.clone(), of(curves[*index].1))).collect();
+        let snapshots: Vec<_> = old.into_iter().map(&mut snapshot).collect();
         let ctx = ui.ctx().clone();
         let waker: Waker = Arc::new(move || ctx.request_repaint());
-        let work = move |_: &_| {
-            wanted.into_iter().map(|(key, snapshot)| (key, Found::of(&snapshot))).collect::<Vec<_>>()
-        };
+        let work = move |_: &_| snapshots.iter().map(Found::of).collect();
         match Job::start("spectra", &waker, work) {
-            Ok(job) => self.job = Some(job),
+            Ok(job) => self.job = Some(SpectraJob { wanted, job }),
             Err(error) => self.problem = Some(format!("No thread for the spectra: {error}.")),
         }
     }
 
     fn drain(&mut self) {
-        let Some(job) = &mut self.job else { return };
-        match job.poll().1 {
+        let Some(SpectraJob { wanted, job }) = &mut self.job else { return };
+        let found = match job.poll().1 {
             Outcome::Running => return,
-            Outcome::Done(all) => {
+            Outcome::Done(found) => {
                 self.problem = None;
-                for (key, found) in all {
-                    let entry = self.entries.entry(key).or_default();
-                    entry.found = found;
-                    entry.generation += 1;
-                }
+                found
             }
             Outcome::Broken => {
-                self.problem = Some("The spectra failed: this is a defect of flqr.".to_owned())
+                self.problem = Some("The spectra failed: this is a defect of flqr.".to_owned());
+                // Not tried again with the same data.
+                wanted.iter().map(|_| Found::default()).collect()
             }
+        };
+        for ((key, of), found) in wanted.drain(..).zip(found) {
+            let entry = self.entries.entry(key).or_default();
+            (entry.of, entry.found) = (Some(of), found);
+            entry.generation += 1;
         }
         self.job = None;
     }
@@ -248,5 +255,33 @@ impl Found {
         let logarithms =
             [&spectrum.amplitude, &spectrum.density].map(|all| all.iter().map(|v| v.log10()).collect());
         Self { spectrum, logarithms, problem }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::decimate::Data;
+    use super::*;
+
+    #[test]
+    fn a_spectrum_is_of_its_data_once_it_is_made_and_goes_with_its_curve() {
+        let x: Vec<f64> = (0..1000).map(|row| f64::from(row) * 1e-3).collect();
+        let curve =
+            |_| DecimationCache::default().indexed(Data::Fixed(&x, &x), [1.0, 1.0], 1).snapshot(0..1000);
+        let mut spectra = Spectra::default();
+        egui::__run_test_ui(|ui| {
+            let a = [("a".to_owned(), 1)];
+            spectra.update(ui, [0.0, 1.0], &a, curve);
+            if spectra.job.is_some() {
+                assert!(spectra.entries.values().all(|entry| entry.of.is_none()), "it is still being made");
+            }
+            while spectra.job.is_some() {
+                spectra.update(ui, [0.0, 1.0], &a, curve);
+                std::thread::yield_now();
+            }
+            assert_eq!(spectra.entries["a"].of, Some((1, [0.0_f64, 1.0].map(f64::to_bits))));
+            spectra.update(ui, [0.0, 1.0], &[("b".to_owned(), 1)], curve);
+            assert!(!spectra.entries.contains_key("a"), "nobody looks at it");
+        });
     }
 }

@@ -8,7 +8,7 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable};
 
 use super::stack::{Panel, PanelCurve, Stack};
-use super::{Data, Unit};
+use super::{Data, FigureFile, FigureKind, Unit};
 
 /// A stack over its own data.
 struct Page {
@@ -258,6 +258,20 @@ fn the_visible_range_is_saved_and_nothing_is_replaced_unasked() {
     }
     assert!(replaced(), "the file is replaced after the question");
     std::fs::remove_dir_all(&folder).unwrap();
+}
+
+#[test]
+fn without_a_dialog_the_form_says_why_once_and_waits_for_a_path() {
+    let mut window = open(vec2(1100.0, 700.0));
+    let file = FigureFile { stack: "page", kind: FigureKind::Svg };
+    file.answer(&window.ctx, Err("There is no file dialog here.".to_owned()));
+    window.run_steps(3);
+    assert_eq!(window.query_all_by_label("There is no file dialog here.").count(), 1);
+    assert!(window.get_by_label("figure path").accesskit_node().is_focused());
+    window.event(Event::Text("a.svg".to_owned()));
+    window.run_steps(2);
+    assert!(window.query_by_label("There is no file dialog here.").is_none(), "typing answers it");
+    window.get_by_label("figure width");
 }
 
 #[test]

@@ -57,6 +57,8 @@ pub(crate) struct RefineTab {
     noted: Option<u64>,
     /// Its row.
     row: Option<LedgerRow>,
+    /// The model that is being saved.
+    saving: Option<Model>,
 }
 
 /// What the page's commands may use of the window.
@@ -101,6 +103,7 @@ impl RefineTab {
             chosen: None,
             noted: None,
             row: None,
+            saving: None,
         }
     }
 
@@ -242,6 +245,7 @@ impl RefineTab {
         let mut document = refined.answer.document.clone();
         let model = self.chosen.clone().unwrap_or_else(|| refined.answer.model.clone());
         let said = remark.clone();
+        let saving = (saved_as == SavedAs::Model).then(|| model.clone());
         let row = self.row.as_ref().map(LedgerRow::provenance);
         let left_out = self.left_out().join(", ");
         let content = move || match saved_as {
@@ -265,7 +269,17 @@ impl RefineTab {
         };
         let path = self.saver.begin(saved_as, path);
         let files = move |path: &Path| Ok(vec![(path.to_owned(), content().into_bytes())]);
-        self.saver.write((saved_as, path, replace), files, remark, around.waker)
+        self.saver.write((saved_as, path, replace), files, remark, around.waker)?;
+        self.saving = saving;
+        Ok(())
+    }
+
+    /// A model that has been saved, and its file.
+    pub(crate) fn take_saved_model(&mut self) -> Option<(PathBuf, Model)> {
+        match self.saver.take_written()? {
+            (SavedAs::Model, path) => Some((path, self.saving.take()?)),
+            (SavedAs::Report, _) => None,
+        }
     }
 
     /// Name that a dialog offers.

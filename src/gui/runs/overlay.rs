@@ -6,7 +6,7 @@ use std::sync::Arc;
 use egui::{Button, Color32, ComboBox, Grid, Sense, Stroke, Ui, vec2};
 use flqr_core::record::{Signal, best_alignment, first_crossing_s};
 
-use super::run::{Ledger, Run, Series};
+use super::run::{Ledger, Run, RunKind, Series};
 use crate::command::Commands;
 use crate::job::{Job, Outcome, Waker};
 use crate::plot::{Data, Panel, PanelCurve, Stack, Unit};
@@ -127,6 +127,14 @@ impl Drawn<'_> {
     }
 }
 
+/// Why a row from before cannot be ticked.
+const NOT_KEPT: &str = "cannot be ticked: a session's file keeps what a run was made with and what came of it, not its \
+    curves. A right click on the row copies the command that makes it again; “What changed” compares its values.";
+
+fn listed_rows(count: usize) -> String {
+    format!("{count} experiment{}", if count == 1 { "" } else { "s" })
+}
+
 impl Overlay {
     pub(super) fn shifts_s(&self) -> &BTreeMap<u64, f64> {
         &self.shifts_s
@@ -143,6 +151,11 @@ impl Overlay {
         if drawn.is_empty() {
             let text = if ticked.is_empty() { "Tick rows to see them over each other." } else { NO_SERIES };
             hint_ui(ui, text);
+            let is_lost = |run: &Run| run.kind == RunKind::Experiment && run.series.is_none();
+            let lost = ledger.rows().iter().filter(|run| is_lost(run)).count();
+            if lost > 0 {
+                hint_ui(ui, format!("{} {NOT_KEPT}", listed_rows(lost)));
+            }
             return;
         }
         if let Some(problem) = &self.problem {

@@ -205,6 +205,11 @@ fn tick_ui(context: &ViewContext<'_>, run: &Run, ticked: &mut BTreeSet<u64>, ui:
             context.commands.send(Command::Runs(RunsCommand::ReadCurves(number)));
         }
     }
+    if !tick && !drawn && run.file().is_none() {
+        let is_curveless = matches!(run.kind, RunKind::Fit | RunKind::Refinement);
+        let reason = if is_curveless { "no curves" } else { "curves not kept" };
+        ui.label(RichText::new(reason).small().weak()).on_hover_text(help);
+    }
     if tick && drawn {
         overlay::key_ui(ui, ticked, number);
     } else if tick && run.file().is_some() {

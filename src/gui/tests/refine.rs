@@ -76,6 +76,13 @@ fn what_a_log_shows_is_found_and_goes_into_the_model() {
     let used = state(&window);
     assert_eq!(used["unsaved_changes"], true);
     assert_eq!(used["refine_tab"]["standing"], "in_model");
+    // The model of this page is that of the session: saved here, it is in a file.
+    let model = TempFile::new("used.toml", "");
+    std::fs::remove_file(&model.0).unwrap();
+    enter(&mut window, "path to save what was found to", model.name());
+    let saved = until(&mut window, "saving", |s| s["unsaved_changes"] == false);
+    assert!(saved["message"].as_str().unwrap().contains(model.name()), "{saved:#}");
+    assert!(std::fs::read_to_string(&model.0).unwrap().contains("cogging"));
 }
 
 #[test]

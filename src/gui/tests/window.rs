@@ -440,11 +440,13 @@ fn a_fit_survives_a_log_that_cannot_be_read_but_not_another_log() {
     let good = TempFile::new("fitted.csv", &pairs_csv());
     let other = TempFile::new("other.csv", &pairs_csv());
     let bad = TempFile::new("unread.csv", "speed_rad_s,torque_nm\n");
+    let text = "Notes, of the day\nThe robot fell, twice, at 3 pm.\nThen it did not.\n12, 13\n";
+    let text = TempFile::new("notes.txt", text);
     let mut window = open(WindowOptions { log: Some(good.0.clone()), ..options(Tab::Friction) }, SIZE);
     until(&mut window, "loading", |s| s["friction_tab"]["log"]["rows"] == 80);
     click(&mut window, "Start fit");
     let fitted = until(&mut window, "the fit", |s| s["friction_tab"]["fit"]["parameters"].is_object());
-    for path in ["/no/such/folder/log.csv", bad.name()] {
+    for path in ["/no/such/folder/log.csv", bad.name(), text.name()] {
         enter(&mut window, "log path", path);
         let refused = until(&mut window, "refusal", |s| {
             s["friction_tab"]["log"]["problem"].as_str().is_some_and(|problem| problem.contains(path))

@@ -44,7 +44,7 @@ pub(super) fn ui(context: &ViewContext<'_>, ui: &mut Ui) {
 fn gain_table_ui(context: &ViewContext<'_>, ui: &mut Ui, designed: &Designed) {
     let reference = context.designer.different();
     let active = context.designer.active;
-    Grid::new("gains").num_columns(5).spacing([10.0, 3.0]).min_col_width(48.0).show(ui, |ui| {
+    Grid::new("gains").num_columns(5).spacing([16.0, 3.0]).min_col_width(48.0).show(ui, |ui| {
         hint_ui(ui, "motor");
         for (name, unit) in COLUMNS {
             hint_ui(ui, name).on_hover_text(unit);

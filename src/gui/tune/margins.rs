@@ -136,7 +136,7 @@ fn sentence_ui(ui: &mut Ui, rows: &[Row]) {
 /// The poles as text, slowest first, conjugate pairs as one.
 fn poles_ui(ui: &mut Ui, poles: &[SampledPole]) {
     CollapsingHeader::new("Poles").id_salt("pole list").show(ui, |ui| {
-        Grid::new("pole table").num_columns(4).spacing([10.0, 2.0]).show(ui, |ui| {
+        Grid::new("pole table").num_columns(4).spacing([18.0, 2.0]).show(ui, |ui| {
             for head in ["pole, 1/s", "damping", "Hz", "z, one IMU period"] {
                 hint_ui(ui, head);
             }

@@ -55,6 +55,28 @@ struct Drag {
 pub(super) struct PolePlane {
     plane: Plane,
     drag: Option<Drag>,
+    /// Weights that a drag has brought next to nothing, with what is to be said of them.
+    spent: Option<(Weights, String)>,
+}
+
+/// A weight that falls below this share of what it was holds nothing any more.
+const SPENT: f64 = 1e-3;
+
+/// What to say where a drag leaves next to nothing of a weight that was there.
+fn spent(before: &Weights, now: &Weights) -> Option<String> {
+    const NAMES: [&str; 4] = ["displacement", "velocity", "pitch", "pitch rate"];
+    let is_spent = |index: &usize| {
+        let (before, now) = (before.q[(*index, *index)], now.q[(*index, *index)]);
+        before > 0.0 && now < SPENT * before
+    };
+    let gone: Vec<usize> = (0..NAMES.len()).filter(is_spent).collect();
+    let weight = |index: &usize| {
+        let [before, now] = [before, now].map(|weights| shown(weights.q[(*index, *index)], 3));
+        format!("{} weight {before} → {now}", NAMES[*index])
+    };
+    let listed = gone.iter().map(weight).collect::<Vec<_>>().join(", ");
+    let meaning = if gone.contains(&0) { ": the robot hardly returns to its place" } else { "" };
+    (!gone.is_empty()).then(|| format!("This place costs the {listed}{meaning}. Undo brings it back."))
 }
 
 impl PolePlane {
@@ -112,6 +134,7 @@ impl PolePlane {
             shown.response.hover_pos().and_then(|pointer| self.nearest(&shown.transform, all, pointer));
         let nearest = nearest.map(|(name, pole)| (name, *pole));
         self.drag_ui(context, now, &shown.response, &shown.transform);
+        self.spent_ui(context, &shown.response, ui);
         let refused = self.drag.as_ref().and_then(|drag| drag.refused);
         shown.response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "plane of poles"));
         shown.response.on_hover_ui_at_pointer(|ui| {
@@ -125,6 +148,17 @@ impl PolePlane {
                     .to_owned(),
             });
         });
+    }
+
+    /// Over the foot of the plane, for as long as these weights are in force.
+    fn spent_ui(&self, context: &ViewContext<'_>, plane: &Response, ui: &mut Ui) {
+        let Some((_, text)) = self.spent.as_ref().filter(|(of, _)| *of == context.session.weights()) else {
+            return;
+        };
+        let room = plane.rect.with_min_x(plane.rect.left() + 6.0).shrink2(Vec2::new(0.0, 4.0));
+        let place = egui::Layout::bottom_up(egui::Align::Min);
+        let mut over = ui.new_child(egui::UiBuilder::new().max_rect(room).layout(place));
+        egui::Frame::new().fill(ui.visuals().extreme_bg_color).show(&mut over, |ui| warning_ui(ui, text));
     }
 
     /// A dragged pole takes the weights with it, as far as there are weights for its place.
@@ -176,6 +210,7 @@ impl PolePlane {
         let model = designed.parameters.linear_model();
         let placed = weights_for_pole(&model, &designed.timing, &drag.start, drag.from, at);
         drag.refused = (!placed.is_reached).then_some(placed.pole);
+        self.spent = spent(&drag.start, &placed.weights).map(|text| (placed.weights, text));
         if placed.weights != context.session.weights() {
             context.commands.send(Command::SetWeights(placed.weights));
         }
@@ -323,4 +358,27 @@ fn dashed(plot_ui: &mut PlotUi<'_>, points: Vec<[f64; 2]>, color: Color32) {
 fn text(plot_ui: &mut PlotUi<'_>, at: [f64; 2], text: &str, color: Color32) {
     let text = egui::RichText::new(text).size(10.0).color(color.gamma_multiply(1.8));
     plot_ui.text(Text::new("", at.into(), text).anchor(egui::Align2::CENTER_BOTTOM).allow_hover(false));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_weight_that_a_drag_leaves_next_to_nothing_of_is_named() {
+        let before = Weights::diagonal([60.0, 30.0, 100.0, 0.0], [20.0, 20.0]);
+        let with = |index: usize, weight: f64| {
+            let mut now = before;
+            now.q[(index, index)] = weight;
+            spent(&before, &now)
+        };
+        let text = with(0, 3e-9).unwrap();
+        assert!(
+            text.contains("displacement weight 60.0 → 3.00e−9") && text.contains("hardly returns"),
+            "{text}"
+        );
+        let text = with(2, 0.0).unwrap();
+        assert!(text.contains("pitch weight 100 → 0.00") && !text.contains("hardly returns"), "{text}");
+        assert_eq!([with(0, 0.1), with(3, 0.0), with(1, 900.0)], [None, None, None]);
+    }
 }
