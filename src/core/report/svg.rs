@@ -77,8 +77,8 @@ fn draw_layout(chart: &Chart, layout: &Layout, name: &str, id: &str, alone: bool
             markup.leaf("rect", &[("width", &wide), ("height", &high), ("fill", &"#ffffff")]);
         }
         layout.legend(markup);
-        for (panel, place) in chart.panels.iter().zip(&layout.panels) {
-            layout.panel(panel, place, markup);
+        for (number, (panel, place)) in chart.panels.iter().zip(&layout.panels).enumerate() {
+            layout.panel(panel, place, &format!("{id}-frame-{number}"), markup);
         }
         layout.x_axis(chart, markup);
     });
@@ -255,7 +255,7 @@ impl Layout {
         }
     }
 
-    fn panel(&self, panel: &Panel, place: &Place, markup: &mut Markup) {
+    fn panel(&self, panel: &Panel, place: &Place, clip: &str, markup: &mut Markup) {
         for (number, line) in place.title.iter().enumerate() {
             let y = place.title_top + LINE_HEIGHT * number as f64 + 14.0;
             markup.text_element("text", &[("class", &"axis"), ("x", &0), ("y", &Px(y))], line);
@@ -266,17 +266,12 @@ impl Layout {
             markup.text_element("text", &[("class", &"ty"), ("x", &at[0].1), ("y", &at[1].1)], &tick.label);
         }
         let plot_width = self.width - RIGHT - self.left;
-        let view = format!("{} {} {} {}", Px(self.left), Px(place.top), Px(plot_width), Px(place.height));
         let frame = [Px(self.left), Px(place.top), Px(plot_width), Px(place.height)];
-        // A picture within the picture: nothing is drawn beyond its frame.
-        let size: [(&str, &dyn fmt::Display); 5] = [
-            ("x", &frame[0]),
-            ("y", &frame[1]),
-            ("width", &frame[2]),
-            ("height", &frame[3]),
-            ("viewBox", &view),
-        ];
-        markup.element("svg", &size, |markup| {
+        // Nothing is drawn beyond the frame. A picture within the picture would do it too, but not every program draws one.
+        let size: [(&str, &dyn fmt::Display); 4] =
+            [("x", &frame[0]), ("y", &frame[1]), ("width", &frame[2]), ("height", &frame[3])];
+        markup.element("clipPath", &[("id", &clip)], |markup| markup.leaf("rect", &size));
+        markup.element("g", &[("clip-path", &format!("url(#{clip})"))], |markup| {
             self.bands(panel, place, markup);
             self.grid(place, &y_ticks, markup);
             for series in &panel.series {
