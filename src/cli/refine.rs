@@ -91,6 +91,14 @@ pub(crate) fn print(out: &mut dyn Write, found: &Refinement) -> io::Result<()> {
             writeln!(out, "  not told from {} by this log", others.join(", "))?;
         }
     }
+    for carried in &found.carried {
+        let drop = carried.error_drop_percent;
+        write!(out, "\n{}, declared: error lower by {drop:.1} % with it", carried.id)?;
+        match carried.error_drop_ci95 {
+            [low, high] if low < high => writeln!(out, " ({low:.1} to {high:.1})")?,
+            _ => writeln!(out)?,
+        }
+    }
     let lost = found.candidates.iter().filter(|tried| tried.fate != Fate::Added);
     for (n, tried) in lost.take(MOST_LOST).enumerate() {
         if n == 0 {

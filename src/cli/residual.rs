@@ -35,9 +35,21 @@ pub(crate) struct Common {
     /// A column of ours from one of the file's, as in torque_nm=current_a*0.32; repeatable
     #[arg(long, value_name = "OURS=THEIRS[*FACTOR]")]
     map: Vec<Mapping>,
+    /// Speeds of an axis or motor that count, either way, rad/s or m/s; the filters see all of the log
+    #[arg(long, value_name = "LOW..HIGH", value_parser = range)]
+    speeds: Option<[f64; 2]>,
     /// Seed of everything that is drawn
     #[arg(long, default_value_t = 1)]
     seed: u64,
+}
+
+/// Two numbers as LOW..HIGH.
+fn range(text: &str) -> Result<[f64; 2], String> {
+    let ends = text.split_once("..").map(|(low, high)| [low, high].map(|end| end.trim().parse::<f64>()));
+    match ends {
+        Some([Ok(low), Ok(high)]) => Ok([low, high]),
+        _ => Err("give two numbers, as 0..9".to_owned()),
+    }
 }
 
 impl Common {
@@ -46,6 +58,7 @@ impl Common {
             motor: self.motor.into(),
             estimate: self.estimate.clone(),
             seed: self.seed,
+            speeds: self.speeds,
             ..Options::default()
         }
     }
@@ -89,7 +102,7 @@ pub(crate) fn print_errors(out: &mut dyn Write, errors: &[(&str, &Errors)]) -> i
     }
     let kinds: [(&str, Kind); 3] = [
         ("residual", |errors| &errors.rmse),
-        ("noise of the sensors alone", |errors| &errors.noise_floor),
+        ("noise floor of the residual", |errors| &errors.noise_floor),
         ("residual by the torque or force itself", |errors| &errors.nrmse),
     ];
     for (title, kind) in kinds {

@@ -104,6 +104,21 @@ impl Effect {
         Self::new(kind.id, machine, motor, values)
     }
 
+    /// What it is where angles count from elsewhere: at an angle q as this one at q + `turn_rad`. The same for one that
+    /// does not return with every turn.
+    #[must_use]
+    pub fn turned(&self, turn_rad: f64) -> Self {
+        let mut turned = self.clone();
+        if self.kind.series {
+            for member in turned.parameters.chunks_exact_mut(self.kind.parameters.len()) {
+                let [(_, order), (_, cos), (_, sin)] = member else { continue };
+                let (s, c) = (*order * turn_rad).sin_cos();
+                (*cos, *sin) = (*cos * c + *sin * s, *sin * c - *cos * s);
+            }
+        }
+        turned
+    }
+
     /// What the library knows of its kind.
     pub fn kind(&self) -> &'static EffectKind {
         self.kind

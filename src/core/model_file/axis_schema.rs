@@ -50,6 +50,9 @@ struct AxisFrictionTable {
     stribeck_speed_m_s: Option<f64>,
     offset_n: Option<f64>,
     stribeck_exponent: Option<f64>,
+    /// Lowest and highest speed of the motion that the numbers come from.
+    told_from_rad_s: Option<[f64; 2]>,
+    told_from_m_s: Option<[f64; 2]>,
 }
 
 /// One kind's keys and values in the order Coulomb, viscous, offset, static, Stribeck speed.
@@ -74,6 +77,23 @@ impl AxisFrictionTable {
             ("static_n", self.static_n),
             ("stribeck_speed_m_s", self.stribeck_speed_m_s),
         ]
+    }
+
+    /// Speeds that the curve comes from, on one kind of axis.
+    fn told_from(&self, linear: bool) -> Result<Option<[f64; 2]>, Refusal> {
+        let keys = [("told_from_rad_s", self.told_from_rad_s), ("told_from_m_s", self.told_from_m_s)];
+        let [(own, range), (other, wrong)] = if linear { [keys[1], keys[0]] } else { keys };
+        if wrong.is_some() {
+            let problem = format!("{other} has the unit of the other kind of axis: use {own}");
+            return Err(Refusal::new(&["friction", other], problem));
+        }
+        match range {
+            Some([low, high]) if !(0.0 <= low && low < high && high.is_finite()) => {
+                let problem = format!("{own} must be a lowest and a higher highest speed, as [0.5, 12.0]");
+                Err(Refusal::new(&["friction", own], problem))
+            }
+            range => Ok(range),
+        }
     }
 
     /// A missing Stribeck part means plain Coulomb friction: static level equal to the Coulomb level.
@@ -122,6 +142,8 @@ impl AxisFile {
             }
         };
         let mut axis = AxisModel::new(parameters);
+        let linear = machine == MachineKind::Linear;
+        axis.friction_told_from = friction.map(|table| table.told_from(linear)).transpose()?.flatten();
         effects_schema::read_into_axis(self.effects, machine, &mut axis)?;
         let tolerance = self.tolerance.read(machine)?;
         Ok(Model { name: self.name, rig: Rig::Axis(axis), tolerance })
@@ -139,6 +161,7 @@ impl AxisFile {
                         stribeck_speed_rad_s: Some(p.stribeck_speed_rad_s),
                         stribeck_exponent: Some(p.stribeck_exponent),
                         offset_nm: Some(p.offset_nm),
+                        told_from_rad_s: own.friction_told_from,
                         ..AxisFrictionTable::default()
                     }
                 });
@@ -154,6 +177,7 @@ impl AxisFile {
                         stribeck_speed_m_s: Some(p.stribeck_speed_rad_s),
                         stribeck_exponent: Some(p.stribeck_exponent),
                         offset_n: Some(p.offset_nm),
+                        told_from_m_s: own.friction_told_from,
                         ..AxisFrictionTable::default()
                     }
                 });

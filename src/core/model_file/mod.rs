@@ -150,6 +150,8 @@ impl RobotModel {
 pub struct AxisModel {
     /// What moves, and its friction.
     pub parameters: AxisParameters,
+    /// Lowest and highest speed of the motion from which its friction was told, rad/s or m/s; none where nobody said.
+    pub friction_told_from: Option<[f64; 2]>,
     /// What else has been found; none of those that are errors of the numbers above, which are put right there.
     pub effects: Vec<Effect>,
 }
@@ -157,7 +159,7 @@ pub struct AxisModel {
 impl AxisModel {
     /// An axis without further effects.
     pub fn new(parameters: AxisParameters) -> Self {
-        Self { parameters, effects: Vec::new() }
+        Self { parameters, friction_told_from: None, effects: Vec::new() }
     }
 }
 

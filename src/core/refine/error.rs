@@ -43,6 +43,19 @@ pub enum RefineError {
         /// The log.
         file: String,
     },
+    /// No range of speeds.
+    #[error("no speed is from {low} to {high}: give the lowest first, as 0..9")]
+    Speeds {
+        /// Lowest, in the unit of the log.
+        low: f64,
+        /// Highest.
+        high: f64,
+    },
+    /// A robot's log has no one speed.
+    #[error(
+        "a range of speeds chooses rows of one motor or axis, and this is a log of a robot: leave it out"
+    )]
+    SpeedsOfRobot,
     /// A name that is not a parameter.
     #[error("`{name}` is not a parameter of this model, estimate all or some of {allowed}")]
     UnknownParameter {

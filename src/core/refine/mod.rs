@@ -50,8 +50,8 @@ use next_experiment::Asked;
 pub use next_experiment::NextExperiment;
 use prediction::{Rows, predictions};
 pub use verdict::{
-    Channels, Corrected, Errors, Fate, Found, Prediction, Quantity, Refinement, Residual, Sized, Test, Tried,
-    Unexplained, Verdict,
+    Carried, Channels, Corrected, Errors, Fate, Found, Prediction, Quantity, Refinement, Residual, Sized,
+    Test, Tried, Unexplained, Verdict,
 };
 
 /// How a model is refined.
@@ -64,6 +64,8 @@ pub struct Options {
     pub estimate: Vec<String>,
     /// Seed of everything that is drawn.
     pub seed: u64,
+    /// Lowest and highest speed of the rows of an axis that count, either way, rad/s or m/s; all of them where none.
+    pub speeds: Option<[f64; 2]>,
     /// Name of the file that the refined model will have, for the commands of an answer; empty for a word in its place.
     pub model_file: String,
 }
@@ -85,7 +87,9 @@ pub fn residual(
     options: &Options,
     watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<Residual, RefineError> {
-    let mut found = match kind_of(model, logs)? {
+    let kind = kind_of(model, logs)?;
+    check_speeds(options, kind)?;
+    let mut found = match kind {
         LogKind::Robot => robot::residual(model, logs, options, watch),
         _ => axis::residual(model, logs, options, watch),
     }?;
@@ -112,6 +116,7 @@ pub fn refine(
     watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<Refinement, RefineError> {
     let kind = kind_of(model, logs)?;
+    check_speeds(options, kind)?;
     if !held_out.is_empty() {
         kind_of(model, held_out)?;
     }
@@ -141,8 +146,17 @@ pub fn refine(
             main.ci95 = explorer::interval(residual, held);
         }
     }
-    found.document = pages::document(&found, logs);
+    found.document = pages::document(&found, logs, held_out);
     Ok(found)
+}
+
+fn check_speeds(options: &Options, kind: LogKind) -> Result<(), RefineError> {
+    match options.speeds {
+        None => Ok(()),
+        Some(_) if kind == LogKind::Robot => Err(RefineError::SpeedsOfRobot),
+        Some([low, high]) if 0.0 <= low && low < high => Ok(()),
+        Some([low, high]) => Err(RefineError::Speeds { low, high }),
+    }
 }
 
 /// What all of the logs hold, as far as the model describes it: a log may serve several kinds.

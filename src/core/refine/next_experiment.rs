@@ -558,6 +558,7 @@ mod tests {
             closed_loop: None,
             next_experiment: None,
             data_health: Vec::new(),
+            carried: Vec::new(),
             parameters: Vec::new(),
             model,
             explorer: Default::default(),

@@ -12,7 +12,7 @@ use super::verdict::{Errors, Fate, Found, Prediction, Quantity, Refinement, Verd
 const MOST_TRIED: usize = 16;
 
 /// The report.
-pub(super) fn document(found: &Refinement, logs: &[Log]) -> Document {
+pub(super) fn document(found: &Refinement, logs: &[Log], held_out: &[Log]) -> Document {
     let mut blocks = vec![verdict(found)];
     if !found.effects.is_empty() {
         blocks.push(Block::Table(effects(found)));
@@ -20,7 +20,7 @@ pub(super) fn document(found: &Refinement, logs: &[Log]) -> Document {
     if let Some(next) = &found.next_experiment {
         blocks.push(Block::notice(Tone::Note, "Next experiment", next.summary.clone()));
     }
-    health(found, logs, &mut blocks);
+    health(found, [logs, held_out], &mut blocks);
     if found.verdict != Verdict::DataUnfit {
         blocks.push(Block::section("The residual"));
         blocks.extend(pictures::in_time(&found.explorer).map(Block::Figure));
@@ -79,9 +79,11 @@ fn said(found: &Found) -> String {
     )
 }
 
-fn health(found: &Refinement, logs: &[Log], blocks: &mut Vec<Block>) {
+fn health(found: &Refinement, [logs, held_out]: [&[Log]; 2], blocks: &mut Vec<Block>) {
     blocks.push(Block::section("Health of the data"));
-    blocks.push(Block::List { numbered: false, items: logs.iter().map(|log| log.source.clone()).collect() });
+    let items = logs.iter().map(|log| log.source.clone());
+    let items = items.chain(held_out.iter().map(|log| format!("{}, held out", log.source))).collect();
+    blocks.push(Block::List { numbered: false, items });
     let mut told: Vec<(&str, Vec<&str>)> = Vec::new();
     for finding in &found.data_health {
         let text = format!("{}: {}; {}", finding.column, finding.problem, finding.mend);

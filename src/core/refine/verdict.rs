@@ -276,6 +276,20 @@ impl Serialize for Tried {
     }
 }
 
+/// An effect that the model declares already, on these logs.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Carried {
+    /// Its id.
+    pub id: &'static str,
+    /// By how much the error on held-out rows is lower with it, the declared numbers estimated anew with it and without,
+    /// in percent of the error without it.
+    pub error_drop_percent: f64,
+    /// 95 % interval of that, by blocks of the held-out rows.
+    pub error_drop_ci95: [f64; 2],
+    /// Where each log's angle counts from, by the effect, rad; fitted logs first.
+    pub zeros_rad: Vec<f64>,
+}
+
 /// A declared number that was estimated along.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Corrected {
@@ -311,6 +325,9 @@ pub struct Refinement {
     pub next_experiment: Option<NextExperiment>,
     /// What is wrong with the logs.
     pub data_health: Vec<HealthFinding>,
+    /// Effects that the model declares already.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub carried: Vec<Carried>,
     /// Declared numbers as this log has them.
     pub parameters: Vec<Corrected>,
     /// The model with all of it.
@@ -340,6 +357,7 @@ impl Refinement {
                 .or(data_health.first())
                 .map(|finding| NextExperiment::in_words(finding.mend.clone())),
             data_health,
+            carried: Vec::new(),
             parameters: Vec::new(),
             model: model.clone(),
             explorer: Explorer::default(),

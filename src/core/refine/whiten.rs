@@ -54,6 +54,11 @@ impl Whitener {
         Self { coefficients: levinson(&products), rows }
     }
 
+    /// Leaves out more rows.
+    pub fn keep(&mut self, wanted: impl Fn(usize) -> bool) {
+        self.rows.retain(|&row| wanted(row));
+    }
+
     /// Places of the rows that are left.
     pub fn rows(&self) -> &[usize] {
         &self.rows

@@ -6,7 +6,7 @@ use crate::effects::{EffectKind, KINDS, Machine, MachineKind, Parameter, Place};
 use crate::refine::select::Member;
 use crate::refine::whiten::Whitener;
 
-use super::trace::Rows;
+use super::trace::{Acting, Rows};
 
 /// An effect at certain shape parameters.
 #[derive(Clone)]
@@ -37,9 +37,8 @@ impl Candidate {
     ) -> Self {
         let terms = kind.terms(machine, &shape);
         let fixed = terms.iter().all(|term| term.amplitude.is_none());
-        let between = kind.place == Place::Actuator;
-        let mut columns: Vec<Vec<f64>> =
-            terms.iter().map(|term| rows.law_column(&*term.law, between)).collect();
+        let how = Acting::of(kind, machine.kind, &shape);
+        let mut columns: Vec<Vec<f64>> = terms.iter().map(|term| rows.law_column(&*term.law, how)).collect();
         if fixed {
             let mut terms = columns.drain(..);
             let mut sum = terms.next().unwrap_or_default();
@@ -125,8 +124,8 @@ pub(super) struct Scales {
 
 impl Scales {
     pub(super) fn new(rows: &Rows, inertia: f64) -> Self {
-        let speeds = rows.pick(|trace, sample| trace.speed[sample].abs());
-        let efforts = rows.pick(|trace, sample| trace.effort[sample].abs());
+        let speeds = rows.counted(|trace, sample| trace.speed[sample].abs());
+        let efforts = rows.counted(|trace, sample| trace.effort[sample].abs());
         let rms =
             |values: &[f64]| (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt();
         let largest = |values: &[f64]| values.iter().copied().fold(0.0, f64::max);

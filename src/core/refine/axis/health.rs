@@ -25,6 +25,10 @@ const CUT_OFF: f64 = 0.2;
 /// which on the sensor is dead.
 const DEAD: f64 = 0.2;
 const AS_BEFORE: f64 = 0.8;
+/// How many times beyond the speeds that friction was told from a log may go.
+const FASTER: f64 = 1.5;
+/// Share of the highest speed below which the lowest is next to rest.
+const AT_REST: f64 = 0.1;
 /// Runs of equal values that are usual, from which on a column is held.
 const HELD_ROWS: usize = 3;
 
@@ -189,6 +193,33 @@ pub(super) fn check_rows(
         }
     }
     found
+}
+
+/// The finding that rows go beyond the speeds that friction was told from.
+pub(super) fn beyond(declared: &Declared, told_from: [f64; 2], seen: [f64; 2]) -> Option<HealthFinding> {
+    // Down to rest is as good as rest.
+    let fast_alone = told_from[0] > AT_REST * told_from[1];
+    let (faster, slower) = (seen[1] > FASTER * told_from[1], fast_alone && FASTER * seen[0] < told_from[0]);
+    let unit = declared.speed_unit();
+    let problem = || {
+        format!(
+            "the log has speeds from {:.2} to {:.2} {unit}, and the friction of the model was told from {:.2} to {:.2} {unit}: \
+             beyond them it is a guess, and may be far off",
+            seen[0], seen[1], told_from[0], told_from[1]
+        )
+    };
+    let mend = "let these logs tell friction (--estimate all), or declare what was measured at such speeds";
+    (faster || slower).then(|| finding(Severity::Warning, declared.names().position, problem(), mend))
+}
+
+/// The note on the speeds that friction is told from.
+pub(super) fn told_from(declared: &Declared, [low, high]: [f64; 2]) -> HealthFinding {
+    let unit = declared.speed_unit();
+    let problem = format!(
+        "friction is told from speeds of {low:.2} to {high:.2} {unit}: slower or faster it is a guess"
+    );
+    let mend = "nothing has to be done; the refined model says so where a log goes beyond them";
+    finding(Severity::Info, declared.names().position, problem, mend)
 }
 
 /// Whether a factor is that of a unit.

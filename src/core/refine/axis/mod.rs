@@ -1,6 +1,7 @@
 //! A single motor or a linear axis: its equation error, and what its model lacks.
 
 mod candidates;
+mod carried;
 mod errors;
 mod floor;
 mod health;
@@ -32,7 +33,7 @@ use floor::Floor;
 use leftover::{Dependence, Variable};
 use rig::{Declared, Nuisance};
 use search::{Fit, Held, Search, White};
-use trace::{Part, Rows};
+use trace::{Asked, Part, Rows};
 
 /// Share of the gain of effects above which what is left shows that they are not the right ones.
 const MISNAMED: f64 = 0.35;
@@ -58,6 +59,9 @@ const OFF_WITH_EFFORT: f64 = 0.03;
 /// Fewest rows that are fitted.
 const LEAST_ROWS: usize = 200;
 
+/// In the place of effects: numbers of the friction.
+const FRICTION: [&str; 3] = ["viscous_error", "coulomb_error", "friction_asymmetry"];
+
 /// How far the declared model is from logs.
 pub(super) fn residual(
     model: &Model,
@@ -65,10 +69,11 @@ pub(super) fn residual(
     options: &Options,
     watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<Residual, RefineError> {
-    let declared = Declared::new(model, options.motor);
+    let mut declared = Declared::new(model, options.motor);
     let mut data_health = health::check(logs, &declared);
     // No number is fitted, so that every row counts.
-    let rows = Rows::new(logs, logs, declared.names());
+    let rows = Rows::new(logs, logs, declared.names(), Asked::new(options.speeds));
+    declared.zeros_rad = carried::zeros_rad(&declared, &rows);
     let [measured, mut target] = declared.targets(&rows);
     let nuisances = declared.nuisances(&rows, &options.estimate)?;
     data_health.extend(health::check_effort(&rows, &declared, &nuisances, &measured, &target));
@@ -82,6 +87,11 @@ pub(super) fn residual(
         let wanted: Vec<f64> = measured.iter().zip(&target).map(|(measured, left)| measured - left).collect();
         tests.extend(search.leftover(&wanted).unwrap_or_default().iter().map(|found| found.test(&declared)));
     }
+    let without = |known: &[f64]| Some(target.iter().zip(known).map(|(left, known)| left + known).collect());
+    let carried = carried::carried(&declared, &rows, &target, without);
+    data_health.extend(carried::findings(&declared, &logs.iter().collect::<Vec<_>>(), &carried));
+    let beyond = |told| health::beyond(&declared, told, rows.speeds(Part::HeldOut)?);
+    data_health.extend(declared.told_from.and_then(beyond));
     let floor = Floor::new(&declared, &rows, Part::HeldOut, &target);
     Ok(Residual { errors: errors(&declared, &rows, &measured, &target, &floor), tests, data_health })
 }
@@ -111,13 +121,21 @@ pub(super) fn refine(
 ) -> Result<Refinement, RefineError> {
     let mut declared = Declared::new(model, options.motor);
     let mut data_health = health::check(logs.iter().chain(held_out), &declared);
-    let rows = Rows::new(logs, held_out, declared.names());
+    let rows = Rows::new(logs, held_out, declared.names(), Asked::new(options.speeds));
     declared.take_over_free(&rows, &options.estimate);
+    declared.zeros_rad = carried::zeros_rad(&declared, &rows);
     let fitted = rows.rows.iter().filter(|row| row.part == Part::Fit).count();
     data_health.extend(health::check_rows(&rows, &declared, fitted, LEAST_ROWS));
     let [measured, target] = declared.targets(&rows);
     let nuisances = declared.nuisances(&rows, &options.estimate)?;
     data_health.extend(health::check_effort(&rows, &declared, &nuisances, &measured, &target));
+    let friction = |nuisance: &Nuisance| nuisance.free && FRICTION.contains(&nuisance.effect);
+    let own = if nuisances.iter().any(friction) { rows.speeds(Part::Fit) } else { None };
+    let told_from = own.or(declared.told_from);
+    let parts = if own.is_some() { &[Part::HeldOut][..] } else { &[Part::Fit, Part::HeldOut] };
+    let beyond = |part: &Part| health::beyond(&declared, told_from?, rows.speeds(*part)?);
+    data_health.extend(parts.iter().find_map(beyond));
+    data_health.extend(own.map(|speeds| health::told_from(&declared, speeds)));
     data_health.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
     let unfit = data_health.iter().any(|finding| finding.severity == crate::record::Severity::Error);
     if unfit {
@@ -138,6 +156,15 @@ pub(super) fn refine(
         return Ok(Refinement::unfit(model, data_health));
     };
     let before_left = search.residual(&first.judged.coefficients);
+    let without = |known: &[f64]| {
+        let target: Vec<f64> = target.iter().zip(known).map(|(left, known)| left + known).collect();
+        let both = [measured.as_slice(), &target];
+        carried::fitted(&rows, &declared.machine, &nuisances, both, &whitener, declared.inertia)
+    };
+    let carried = carried::carried(&declared, &rows, &before_left, without);
+    let all_logs: Vec<&Log> = logs.iter().chain(held_out).collect();
+    data_health.extend(carried::findings(&declared, &all_logs, &carried));
+    data_health.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
     let first_error = first.judged.error() / first.blocks.rows() as f64;
     let before_structure = search.leftover(&wanted).unwrap_or_default();
     report(watch, 0.2)?;
@@ -199,7 +226,7 @@ pub(super) fn refine(
     Ok(Refinement {
         verdict,
         model: refined_model(
-            declared.corrected_model(model, options.motor, &values),
+            declared.corrected_model(model, options.motor, (&values, told_from)),
             options.motor,
             &effects,
         ),
@@ -211,6 +238,7 @@ pub(super) fn refine(
         closed_loop: None,
         next_experiment: None,
         data_health,
+        carried,
         parameters: corrections,
         explorer,
         document: Default::default(),

@@ -1,6 +1,6 @@
 //! What a model declares of one axis.
 
-use crate::effects::{Effect, Machine, MachineKind, Place};
+use crate::effects::{Effect, Machine, MachineKind, Role};
 use crate::friction::{Stribeck, StribeckParameters};
 use crate::identify::motion::{Axis, place};
 use crate::model_file::{AxisParameters, Model, Rig, Tolerances};
@@ -8,7 +8,7 @@ use crate::refine::Variable;
 use crate::refine::error::RefineError;
 use crate::robot::Motor;
 
-use super::trace::{Names, Part, Rows, Trace};
+use super::trace::{Acting, Names, Part, Rows, Trace};
 use crate::refine::select::{Blocks, Member};
 
 /// Share of the Coulomb level that an offset may be off by, beside its own tolerance.
@@ -35,6 +35,10 @@ pub(super) struct Declared {
     pub(super) friction: Option<StribeckParameters>,
     pub(super) effects: Vec<Effect>,
     pub(super) tolerances: Tolerances,
+    /// Speeds from which the model has its friction.
+    pub(super) told_from: Option<[f64; 2]>,
+    /// Where the angle of each log counts from, as the effects have it, rad.
+    pub(super) zeros_rad: Vec<f64>,
 }
 
 /// A declared number that is estimated along.
@@ -110,6 +114,11 @@ impl Declared {
             friction: friction.map(|curve| *curve.parameters()),
             effects,
             tolerances: model.tolerance.clone(),
+            told_from: match &model.rig {
+                Rig::Robot(_) => None,
+                Rig::Axis(axis) => axis.friction_told_from,
+            },
+            zeros_rad: Vec::new(),
         }
     }
 
@@ -181,10 +190,24 @@ impl Declared {
         });
         let mut target: Vec<f64> = measured.iter().zip(&declared).map(|(a, b)| a - b).collect();
         for effect in &self.effects {
-            let known = rows.law_column(&effect.law(&self.machine), effect.kind().place == Place::Actuator);
+            let known = self.known(effect, rows);
             target.iter_mut().zip(&known).for_each(|(target, known)| *target -= known);
         }
         [measured, target]
+    }
+
+    /// What a declared effect adds to the residual, by each log's own zero of the angle.
+    pub(super) fn known(&self, effect: &Effect, rows: &Rows) -> Vec<f64> {
+        let how = Acting::of(effect.kind(), self.machine.kind, &effect.values(Role::Shape));
+        rows.column(|trace| {
+            let zero_rad = self.zeros_rad.get(trace.log).copied().unwrap_or(0.0);
+            trace.acts(&effect.turned(zero_rad).law(&self.machine), how)
+        })
+    }
+
+    /// Unit of its speed.
+    pub(super) fn speed_unit(&self) -> &'static str {
+        if self.is_linear() { "m/s" } else { "rad/s" }
     }
 
     /// Puts a free inertia where the rows have it, as a first guess: the noise of an acceleration is weighed by it.
@@ -321,7 +344,7 @@ impl Declared {
         }
         // A curve without a Stribeck part may lack a little of one, at speeds that the log has.
         let level = share(place::STATIC) * curve.coulomb_nm;
-        let fastest = rows.pick(|trace, sample| trace.speed[sample].abs()).into_iter().fold(0.0, f64::max);
+        let fastest = rows.counted(|trace, sample| trace.speed[sample].abs()).into_iter().fold(0.0, f64::max);
         let scale = curve.stribeck_speed_rad_s;
         if !stribeck && level > 0.0 && scale < STRIBECK_OF_FASTEST * fastest {
             let faded = |trace: &Trace| {
@@ -379,7 +402,7 @@ impl Declared {
         &self,
         model: &Model,
         motor: Motor,
-        corrections: &[(&'static str, f64)],
+        (corrections, told_from): (&[(&'static str, f64)], Option<[f64; 2]>),
     ) -> Model {
         let value = |key: &str, declared: f64| {
             corrections.iter().find(|(name, _)| *name == key).map_or(declared, |&(_, value)| value)
@@ -398,13 +421,21 @@ impl Declared {
                 robot.parameters.wheel_inertia_kg_m2 = inertia;
                 robot.friction[motor as usize] = friction;
             }
-            Rig::Axis(axis) => match &mut axis.parameters {
-                AxisParameters::Rotary { inertia_kg_m2, gravity_torque_nm, friction: own } => {
-                    (*inertia_kg_m2, *own) = (inertia, friction);
-                    *gravity_torque_nm = value(keys[place::GRAVITY], self.gravity);
+            Rig::Axis(axis) => {
+                match &mut axis.parameters {
+                    AxisParameters::Rotary { inertia_kg_m2, gravity_torque_nm, friction: own } => {
+                        (*inertia_kg_m2, *own) = (inertia, friction);
+                        *gravity_torque_nm = value(keys[place::GRAVITY], self.gravity);
+                    }
+                    AxisParameters::Linear { mass_kg, friction: own } => {
+                        (*mass_kg, *own) = (inertia, friction);
+                    }
                 }
-                AxisParameters::Linear { mass_kg, friction: own } => (*mass_kg, *own) = (inertia, friction),
-            },
+                axis.friction_told_from = told_from;
+                // By the zero of the first log.
+                let zero_rad = self.zeros_rad.first().copied().unwrap_or(0.0);
+                axis.effects.iter_mut().for_each(|effect| *effect = effect.turned(zero_rad));
+            }
         }
         model
     }

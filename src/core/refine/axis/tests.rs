@@ -303,6 +303,34 @@ fn a_refined_motor_carries_over_to_another_record() {
     assert!(drop > 0.55, "{drop}");
 }
 
+/// Another record of that motor, at fifteen times the speed and with its encoder in relative mode: near its reversals,
+/// where the waves are within the filter, the effect carries over, with its declared numbers estimated anew; elsewhere it
+/// does no harm. What friction became at low speed does not reach that far, and that is said.
+#[test]
+fn an_effect_of_a_measured_motor_carries_over_to_a_record_at_other_speeds() {
+    let logs = ["speed_test1", "acc_current", "rolling_data1"];
+    let logs = logs.map(|name| shared(&format!("laas_bldc/{name}.csv"), &LAAS));
+    let [Some(slow), Some(fast), Some(rolling)] = logs else { return };
+    let model = refined(SMALL, &[slow], &[], &FREE).model;
+    let text = model.to_toml();
+    let options =
+        Options { speeds: Some([0.0, 12.0]), estimate: vec!["all".to_owned()], ..Options::default() };
+    let quiet = &mut |_| ControlFlow::Continue(());
+    let near = refine(&model, std::slice::from_ref(&fast), &[], &options, quiet).unwrap();
+    assert_eq!(near.carried[0].id, "cogging");
+    assert!(near.carried[0].error_drop_percent > 55.0, "{:?}", near.carried);
+    let warned = |found: &[crate::record::HealthFinding], words: &str| {
+        found.iter().any(|finding| finding.severity == Severity::Warning && finding.problem.contains(words))
+    };
+    assert!(warned(&near.data_health, "counts from elsewhere"), "{:#?}", near.data_health);
+    let all = refined(&text, std::slice::from_ref(&fast), std::slice::from_ref(&rolling), &["all"]);
+    assert!(all.carried[0].error_drop_percent > -2.0, "{:?}", all.carried);
+    for log in [fast, rolling] {
+        let told = residual(&model, &[log], &Options::default(), quiet).unwrap();
+        assert!(warned(&told.data_health, "friction of the model was told from"), "{:#?}", told.data_health);
+    }
+}
+
 #[test]
 fn a_fast_measured_motor_gets_no_effect() {
     let Some(log) = shared("laas_bldc/acc_current.csv", &LAAS) else { return };

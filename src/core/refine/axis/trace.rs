@@ -1,8 +1,8 @@
 //! Logs of an axis as rows of one regression: uniform time, one kernel for every column, rests left out.
 
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 
-use crate::effects::{Law, Moment};
+use crate::effects::{EffectKind, Law, MachineKind, Moment, Place};
 use crate::identify::filter::{ZeroPhase, derivative};
 use crate::identify::motion::kinematics::{Stretch, stretches, white_noise};
 use crate::record::Log;
@@ -30,6 +30,8 @@ pub(super) enum Part {
     Fit,
     /// Errors are told on it.
     HeldOut,
+    /// Neither, at a speed that is not asked about; filters see it.
+    Beside,
 }
 
 /// One row of the regression.
@@ -46,6 +48,8 @@ pub(super) struct Row {
 
 /// A stretch of a log with its motion.
 pub(super) struct Trace {
+    /// Place of its log, those that are fitted first.
+    pub(super) log: usize,
     /// Time of the first sample since the start of the log, s.
     pub(super) start_s: f64,
     pub(super) step_s: f64,
@@ -70,6 +74,25 @@ pub(super) struct Rows {
     pub(super) rest_share: f64,
     /// How the column of the speed goes with the position, where there is one.
     pub(super) agreement: Option<Agreement>,
+    asked: Asked,
+}
+
+/// Speeds that are asked about, either way.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Asked([f64; 2]);
+
+impl Asked {
+    pub(super) fn new(speeds: Option<[f64; 2]>) -> Self {
+        Self(speeds.unwrap_or([0.0, f64::INFINITY]))
+    }
+
+    fn is_all(self) -> bool {
+        self == Self::new(None)
+    }
+
+    fn about(self, speed: f64) -> bool {
+        (self.0[0]..=self.0[1]).contains(&speed.abs())
+    }
 }
 
 /// How a column of the speed goes with the position.
@@ -144,7 +167,7 @@ pub(super) struct Names {
 
 impl Rows {
     /// Rows of `logs`, of which the last third is held out unless there are logs `held_out`.
-    pub(super) fn new(logs: &[Log], held_out: &[Log], names: Names) -> Self {
+    pub(super) fn new(logs: &[Log], held_out: &[Log], names: Names, asked: Asked) -> Self {
         let cut = |log: &Log| {
             let column = |name: &str| log.column(name).unwrap_or_default();
             stretches(column("time_s"), column(names.position), column(names.effort))
@@ -153,11 +176,12 @@ impl Rows {
         let others: Vec<Vec<Stretch>> = held_out.iter().map(cut).collect();
         let all = || fitted.iter().flatten();
         let step_s = all().next().map_or(1.0, |stretch| stretch.step_s);
-        let position_noise = logs.iter().map(|log| noise_of_rows(log, names.position)).fold(0.0, f64::max);
+        let position_noise =
+            logs.iter().map(|log| noise_of_rows(log, names.position, asked)).fold(0.0, f64::max);
         let effort_noise = white_noise(all().flat_map(|stretch| stretch.effort.windows(5)));
         let with_speed: Vec<Stretch> = logs.iter().flat_map(|log| with_speed(log, names)).collect();
-        let kernel = choose_kernel(all(), &with_speed, step_s, position_noise);
-        let agreement = agreement(&kernel, &with_speed);
+        let kernel = choose_kernel(all(), &with_speed, step_s, position_noise, asked);
+        let agreement = agreement(&kernel, &with_speed, asked);
         let mut found = Self {
             traces: Vec::new(),
             rows: Vec::new(),
@@ -166,9 +190,10 @@ impl Rows {
             effort_noise,
             rest_share: 0.0,
             agreement,
+            asked,
         };
         let (mut resting, mut samples) = (0, 0);
-        for stretches in fitted {
+        for (log, stretches) in fitted.into_iter().enumerate() {
             let end_s = stretches.last().map_or(0.0, end_s);
             let start_s = stretches.first().map_or(0.0, |stretch| stretch.start_s);
             let [last_s, first_s] = split_s(end_s - start_s);
@@ -178,13 +203,13 @@ impl Rows {
                 time_s if time_s >= first_s => Some(Part::HeldOut),
                 _ => None,
             };
-            let counts = found.add(stretches, start_s, part);
+            let counts = found.add(log, stretches, start_s, part);
             resting += counts[0];
             samples += counts[1];
         }
-        for stretches in others {
+        for (log, stretches) in others.into_iter().enumerate() {
             let start_s = stretches.first().map_or(0.0, |stretch| stretch.start_s);
-            found.add(stretches, start_s, |_| Some(Part::HeldOut));
+            found.add(logs.len() + log, stretches, start_s, |_| Some(Part::HeldOut));
         }
         found.rest_share = resting as f64 / samples.max(1) as f64;
         found
@@ -193,6 +218,7 @@ impl Rows {
     /// Adds the stretches of a log; numbers of resting and of all samples.
     fn add(
         &mut self,
+        log: usize,
         stretches: Vec<Stretch>,
         log_start_s: f64,
         part: impl Fn(f64) -> Option<Part>,
@@ -213,6 +239,7 @@ impl Rows {
             counts[1] += resting.len();
             let second = second_difference(&stretch.position, stretch.step_s);
             let trace = Trace {
+                log,
                 start_s: stretch.start_s - log_start_s,
                 step_s: stretch.step_s,
                 position: stretch.position,
@@ -234,8 +261,11 @@ impl Rows {
         for sample in (ends..samples.saturating_sub(ends)).step_by(self.kernel.thinning) {
             let time_s = trace.start_s + sample as f64 * trace.step_s;
             let part = part(time_s).filter(|_| !resting[sample]);
+            let part =
+                part.map(|part| if self.asked.about(trace.speed[sample]) { part } else { Part::Beside });
             if let Some(part) = part {
-                let follows = before == Some(part);
+                let follows = before
+                    .is_some_and(|before| before == part || before == Part::Beside || part == Part::Beside);
                 self.rows.push(Row { trace: self.traces.len(), sample, part, follows, time_s });
             }
             before = part;
@@ -244,7 +274,7 @@ impl Rows {
 
     /// Whether the position goes further than its noise, and the speed more.
     pub(super) fn moves(&self) -> bool {
-        let speed = self.pick(|trace, sample| trace.speed[sample]);
+        let speed = self.counted(|trace, sample| trace.speed[sample]);
         let rms = (speed.iter().map(|v| v * v).sum::<f64>() / speed.len().max(1) as f64).sqrt();
         let noise = (self.position_noise * self.kernel.noise_gain(1)).sqrt();
         rms > 5.0 * noise
@@ -252,14 +282,30 @@ impl Rows {
 
     /// Whether a fair share of the rows goes either way.
     pub(super) fn both_ways(&self) -> bool {
-        let forward = self.rows.iter().filter(|row| self.traces[row.trace].speed[row.sample] > 0.0).count();
-        let share = forward as f64 / self.rows.len().max(1) as f64;
+        let speeds = self.counted(|trace, sample| trace.speed[sample]);
+        let forward = speeds.iter().filter(|speed| **speed > 0.0).count();
+        let share = forward as f64 / speeds.len().max(1) as f64;
         (ONE_WAY..=1.0 - ONE_WAY).contains(&share)
     }
 
     /// A signal of each trace at the rows, unfiltered.
     pub(super) fn pick(&self, signal: impl Fn(&Trace, usize) -> f64) -> Vec<f64> {
         self.rows.iter().map(|row| signal(&self.traces[row.trace], row.sample)).collect()
+    }
+
+    /// The same at the rows that count.
+    pub(super) fn counted(&self, signal: impl Fn(&Trace, usize) -> f64) -> Vec<f64> {
+        let rows = self.rows.iter().filter(|row| row.part != Part::Beside);
+        rows.map(|row| signal(&self.traces[row.trace], row.sample)).collect()
+    }
+
+    /// Lowest and highest speed of a part, but for one row in a hundred at either end.
+    pub(super) fn speeds(&self, part: Part) -> Option<[f64; 2]> {
+        let rows = self.rows.iter().filter(|row| row.part == part);
+        let mut speeds: Vec<f64> = rows.map(|row| self.traces[row.trace].speed[row.sample].abs()).collect();
+        speeds.sort_by(f64::total_cmp);
+        let last = speeds.len().checked_sub(1)?;
+        Some([speeds[last / 100], speeds[last - last / 100]])
     }
 
     /// A signal of each trace behind the kernel.
@@ -269,23 +315,32 @@ impl Rows {
         self.rows.iter().map(|row| filtered[row.trace][row.sample]).collect()
     }
 
-    /// What a law adds to r = T − I q̈ − τ_f, behind the kernel. `between` takes the mean of two rows, as the torque
-    /// that a second difference sees.
-    pub(super) fn law_column(&self, law: &dyn Law, between: bool) -> Vec<f64> {
-        self.column(|trace| {
-            let mut law = law.boxed_clone();
-            let mut act = |sample: usize| {
-                let moment = trace.moment(sample);
-                -law.act(&moment).on_motor_nm(moment.direction())
-            };
-            let mut values: Vec<f64> = (0..trace.position.len()).map(&mut act).collect();
-            if between {
-                for sample in (1..values.len()).rev() {
-                    values[sample] = 0.5 * (values[sample] + values[sample - 1]);
-                }
-            }
-            values
-        })
+    /// What a law adds to r = T − I q̈ − τ_f, behind the kernel.
+    pub(super) fn law_column(&self, law: &dyn Law, how: Acting) -> Vec<f64> {
+        self.column(|trace| trace.acts(law, how))
+    }
+}
+
+/// How a law is taken at the rows of a log.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Acting {
+    /// As the mean of two rows, as the torque that a second difference sees.
+    between: bool,
+    /// Finest wave of the position that it has, rad per unit; 0 where it has none.
+    wave: f64,
+}
+
+/// Angle of a wave in a row above which it is taken as its mean over the row: rows alone would show a slower one.
+const FINE_RAD: f64 = 1.0;
+/// The mean is over so many places in a rad, and over so many at most.
+const PLACES_A_RAD: f64 = 3.0;
+const MOST_PLACES: f64 = 100.0;
+
+impl Acting {
+    pub(super) fn of(kind: &EffectKind, machine: MachineKind, shape: &[f64]) -> Self {
+        let wave = |&shape: &f64| if machine == MachineKind::Linear { TAU / shape } else { shape };
+        let finest = shape.iter().map(wave).fold(0.0, f64::max);
+        Self { between: kind.place == Place::Actuator, wave: if kind.series { finest } else { 0.0 } }
     }
 }
 
@@ -293,6 +348,33 @@ impl Trace {
     /// Acceleration by second differences, which see just the torques of the rows before and at a sample.
     pub(super) fn second_difference(&self) -> Vec<f64> {
         self.second.clone()
+    }
+
+    /// What a law adds to the residual at every sample.
+    pub(super) fn acts(&self, law: &dyn Law, how: Acting) -> Vec<f64> {
+        let mut law = law.boxed_clone();
+        let mut act = |moment: &Moment| -law.act(moment).on_motor_nm(moment.direction());
+        let mut at = |sample: usize| {
+            let moment = self.moment(sample);
+            let turn = moment.motor_speed_rad_s * self.step_s;
+            let angle = how.wave * turn.abs();
+            if angle <= FINE_RAD {
+                return act(&moment);
+            }
+            let places = (PLACES_A_RAD * angle).min(MOST_PLACES).ceil();
+            let place =
+                |index: u32| moment.motor_angle_rad + turn * ((f64::from(index) + 0.5) / places - 0.5);
+            let sum =
+                (0..places as u32).map(|index| act(&Moment { motor_angle_rad: place(index), ..moment }));
+            sum.sum::<f64>() / places
+        };
+        let mut values: Vec<f64> = (0..self.position.len()).map(&mut at).collect();
+        if how.between {
+            for sample in (1..values.len()).rev() {
+                values[sample] = 0.5 * (values[sample] + values[sample - 1]);
+            }
+        }
+        values
     }
 
     /// What a law sees at a sample.
@@ -312,13 +394,14 @@ impl Trace {
 
 /// Variance of white noise in a column, from what the rows around a row foretell of it: a cubic through two on either
 /// side, at their own times, so that jitter of the clock counts as noise of a moving axis.
-fn noise_of_rows(log: &Log, name: &str) -> f64 {
+fn noise_of_rows(log: &Log, name: &str, asked: Asked) -> f64 {
     let (Some(time), Some(values)) = (log.column("time_s"), log.column(name)) else { return 0.0 };
     let usual_s = crate::record::row_time_s(time).unwrap_or(f64::INFINITY);
     let (mut sum, mut count) = (0.0, 0_usize);
     for (times, values) in time.windows(5).zip(values.windows(5)) {
         let near = times.windows(2).all(|pair| (0.1 * usual_s..3.0 * usual_s).contains(&(pair[1] - pair[0])));
-        if !near {
+        let speed = (values[4] - values[0]) / (times[4] - times[0]);
+        if !near || !(asked.is_all() || asked.about(speed)) {
             continue;
         }
         let weight =
@@ -343,6 +426,7 @@ fn choose_kernel<'a>(
     with_speed: &[Stretch],
     step_s: f64,
     position_noise: f64,
+    asked: Asked,
 ) -> Kernel {
     let highest = HIGHEST_CUTOFF_HZ.min(0.25 / step_s);
     let divisors = [1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0];
@@ -350,13 +434,14 @@ fn choose_kernel<'a>(
     let share = |kernel: &Kernel| {
         let (mut power, mut count) = (0.0, 0);
         for stretch in stretches.clone() {
-            let position = kernel.apply(&stretch.position);
-            let acceleration = derivative(&derivative(&position, step_s), step_s);
-            power += acceleration.iter().map(|a| a * a).sum::<f64>();
-            count += acceleration.len();
+            let speed = derivative(&kernel.apply(&stretch.position), step_s);
+            let acceleration = derivative(&speed, step_s);
+            let own = || acceleration.iter().zip(&speed).filter(|(_, speed)| asked.about(**speed));
+            power += own().map(|(a, _)| a * a).sum::<f64>();
+            count += own().count();
         }
         let own = position_noise * kernel.noise_gain(2) * count as f64 / power;
-        let incoherent = agreement(kernel, with_speed).map_or(0.0, |agreement| agreement.incoherent);
+        let incoherent = agreement(kernel, with_speed, asked).map_or(0.0, |agreement| agreement.incoherent);
         // A speed that has nothing of the position's acceleration says nothing of the position's noise.
         if incoherent < 0.9 { own.max(incoherent) } else { own }
     };
@@ -394,15 +479,17 @@ fn with_speed(log: &Log, names: Names) -> Vec<Stretch> {
 }
 
 /// Regression of the position's acceleration on the speed's, its slope and the slope of that, which take up a lag.
-fn agreement(kernel: &Kernel, stretches: &[Stretch]) -> Option<Agreement> {
+fn agreement(kernel: &Kernel, stretches: &[Stretch], asked: Asked) -> Option<Agreement> {
     let ends = (2.0 * END_PERIODS / (kernel.cutoff_hz * kernel.step_s)) as usize;
     let mut columns: [Vec<f64>; 4] = Default::default();
     for stretch in stretches.iter().filter(|stretch| stretch.position.len() > 4 * ends) {
         let of_position = kernel.apply(&second_difference(&stretch.position, stretch.step_s));
+        let speed = if asked.is_all() { Vec::new() } else { kernel.apply(&stretch.effort) };
         let of_speed = kernel.apply(&derivative(&stretch.effort, stretch.step_s));
         let slope = derivative(&of_speed, stretch.step_s);
         let bend = derivative(&slope, stretch.step_s);
-        for sample in (ends..of_position.len() - ends).step_by(kernel.thinning) {
+        let rows = (ends..of_position.len() - ends).step_by(kernel.thinning);
+        for sample in rows.filter(|&sample| speed.get(sample).is_none_or(|&speed| asked.about(speed))) {
             let values = [of_speed[sample], slope[sample], bend[sample], of_position[sample]];
             columns.iter_mut().zip(values).for_each(|(column, value)| column.push(value));
         }

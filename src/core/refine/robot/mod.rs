@@ -313,6 +313,7 @@ fn answer(
         closed_loop: None,
         next_experiment: None,
         data_health,
+        carried: Vec::new(),
         parameters,
         model: refined,
         explorer,

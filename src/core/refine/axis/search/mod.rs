@@ -83,7 +83,10 @@ pub(super) fn whitener(rows: &Rows, inertia: f64) -> Whitener {
         position * kernel.acceleration_noise(frequency) + effort * kernel.effort_noise(frequency)
     };
     let follows: Vec<bool> = rows.rows.iter().map(|row| row.follows).collect();
-    Whitener::new(power, kernel.thinning, &follows, |row| rows.rows[row].part == Part::Fit)
+    let mut found =
+        Whitener::new(power, kernel.thinning, &follows, |row| rows.rows[row].part != Part::HeldOut);
+    found.keep(|row| rows.rows[row].part == Part::Fit);
+    found
 }
 
 impl White {
