@@ -20,6 +20,18 @@ const OTHER_RADIUS: f64 = 0.05;
 const SHORTEST_S: f64 = 8.0;
 const SLOWEST_S: f64 = 0.0101;
 
+/// A wheel that stands so long while the other one turns so far has no sensor.
+const DEAD_S: f64 = 0.5;
+const DEAD_RAD: f64 = 0.1;
+/// Correlation of both torques from which on one must not be the other turned round, or many times it.
+const ALIKE: f64 = 0.7;
+const MANY: f64 = 5.0;
+/// Half of the time in which a difference of the torques speeds one wheel up, s; the correlation, and its standard errors
+/// below 0, from which on it speeds the other one up.
+const CROSS_S: f64 = 0.02;
+const CROSSED: f64 = 0.15;
+const CROSSED_Z: f64 = 4.0;
+
 pub(super) fn unfit(findings: &[HealthFinding]) -> bool {
     findings.iter().any(|finding| finding.severity == Severity::Error)
 }
@@ -187,9 +199,17 @@ fn of_signals(log: &Log, readings: &Readings, robot: &RobotModel) -> Vec<HealthF
             ));
         }
     }
+    found.extend(died(readings));
+    found.extend(one_torque_off(readings));
+    let most = most_torque_nm(robot);
     for (motor, name) in ["torque_left_nm", "torque_right_nm"].into_iter().enumerate() {
         let torque = &readings.torque_nm[motor];
         let peak = torque.iter().fold(0.0_f64, |a, b| a.max(b.abs()));
+        if peak > most {
+            let problem =
+                format!("goes up to {peak:.0} N m, which no motor of this robot gives: its unit is wrong");
+            found.push(finding(Severity::Error, name, problem, "map the column with the right factor"));
+        }
         let clipped =
             torque.iter().filter(|value| value.abs() > 0.9999 * peak).count() as f64 / torque.len() as f64;
         if clipped > 0.01 {
@@ -199,6 +219,96 @@ fn of_signals(log: &Log, readings: &Readings, robot: &RobotModel) -> Vec<HealthF
         }
     }
     found
+}
+
+/// More than a motor gives: some times its limit, or what holds the robot's whole weight at the length of its body.
+fn most_torque_nm(robot: &RobotModel) -> f64 {
+    let p = &robot.parameters;
+    let weight_n = (p.body_mass_kg + 2.0 * p.wheel_mass_kg) * p.gravity_m_s2;
+    robot.limits.torque_nm.map_or(weight_n * (p.com_height_m + p.wheel_radius_m), |limit| MANY * limit)
+}
+
+/// A wheel's angle that stays where it is for long while the other one goes on.
+fn died(readings: &Readings) -> Option<HealthFinding> {
+    let names = ["motor_angle_left_rad", "motor_angle_right_rad"];
+    let travel = |column: &[f64]| {
+        let [low, high] = column
+            .iter()
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &q| [low.min(q), high.max(q)]);
+        high - low
+    };
+    let of = |motor: usize| {
+        let (own, other) = (&readings.angle_rad[motor], &readings.angle_rad[1 - motor]);
+        let mut start = 0;
+        let runs = own.chunk_by(|a, b| a == b).map(|run| {
+            start += run.len();
+            start - run.len()..start
+        });
+        let longest = runs.max_by_key(ExactSizeIterator::len)?;
+        let seconds = longest.len() as f64 * readings.dt_s;
+        let dead = seconds > DEAD_S && travel(&other[longest.clone()]) > DEAD_RAD;
+        let problem = format!(
+            "stays the same for {seconds:.1} s from {:.1} s on while the other wheel goes on: the sensor is dead there",
+            longest.start as f64 * readings.dt_s
+        );
+        let mend = "check the sensor and its cable, or cut the log to the part before";
+        dead.then(|| finding(Severity::Error, names[motor], problem, mend))
+    };
+    (0..2).find_map(of)
+}
+
+/// One torque that runs against the other, or is many times larger.
+fn one_torque_off(readings: &Readings) -> Option<HealthFinding> {
+    let [left, right] = &readings.torque_nm;
+    let (slope, correlation) = relation(left, right);
+    let problem = if correlation < -ALIKE {
+        "runs against the left motor's torque: the sign of one of them is wrong".to_owned()
+    } else if correlation > ALIKE && !(1.0 / MANY..MANY).contains(&slope) {
+        format!("is {slope:.3} times the left motor's torque: the unit of one of them is wrong")
+    } else {
+        return None;
+    };
+    let mend = "map the column that is off, --map torque_right_nm=torque_right_nm*FACTOR";
+    Some(finding(Severity::Error, "torque_right_nm", problem, mend))
+}
+
+/// Wheels of which each follows the other one's torque. A turn of the robot tells: what one torque is more than the other
+/// speeds its own wheel up. Wheels that always turn alike tell nothing, and then it does not matter.
+fn crosswise(readings: &Readings) -> Option<HealthFinding> {
+    let half = ((CROSS_S / readings.dt_s).round() as usize).max(2);
+    let [angles, torques] = [&readings.angle_rad, &readings.torque_nm];
+    let apart: Vec<f64> = angles[0].iter().zip(&angles[1]).map(|(left, right)| left - right).collect();
+    // Twice summed up, a torque is an angle.
+    let (mut speed, mut angle) = (0.0, 0.0);
+    let pushed: Vec<f64> = torques[0]
+        .iter()
+        .zip(&torques[1])
+        .map(|(left, right)| {
+            angle += speed;
+            speed += left - right;
+            angle
+        })
+        .collect();
+    let bends = |column: &[f64]| -> Vec<f64> {
+        let bent = |i: usize| column[i + 2 * half] - 2.0 * column[i + half] + column[i];
+        let bends: Vec<f64> =
+            (0..column.len().saturating_sub(2 * half)).step_by(2 * half).map(bent).collect();
+        let mean = bends.iter().sum::<f64>() / bends.len().max(1) as f64;
+        bends.into_iter().map(|bend| bend - mean).collect()
+    };
+    let (pushed, apart) = (bends(&pushed), bends(&apart));
+    let (_, correlation) = relation(&pushed, &apart);
+    let z = correlation * (pushed.len() as f64).sqrt();
+    if !(correlation < -CROSSED && z < -CROSSED_Z) {
+        return None;
+    }
+    let problem = format!(
+        "turns the right wheel, and the right motor's torque the left one (correlation {correlation:.2}): left and right of \
+         the torques or of the wheels' sensors are swapped"
+    );
+    let mend =
+        "map them crosswise, --map torque_left_nm=torque_right_nm --map torque_right_nm=torque_left_nm";
+    Some(finding(Severity::Error, "torque_left_nm", problem, mend))
 }
 
 /// Findings about the equations: a torque that cannot be what moves this robot.
@@ -218,8 +328,13 @@ pub(super) fn check_motion(trace: &Trace<'_>) -> Vec<HealthFinding> {
     } else if correlation.abs() < 0.5 {
         format!("does not go with the motion (correlation {correlation:.2}): another column, model or pitch")
     } else {
-        return Vec::new();
+        // Torques that are turned round turn the robot the other way too.
+        return trace.readings().find_map(crosswise).into_iter().collect();
     };
     let mend = "map the column with the right factor, --map torque_left_nm=COLUMN*FACTOR, or mend the model";
     vec![finding(Severity::Error, "torque_left_nm", problem, mend)]
 }
+
+#[cfg(test)]
+#[path = "health_tests.rs"]
+mod tests;

@@ -47,6 +47,11 @@ pub(super) struct Run {
 const GAP_S: f64 = 0.5;
 
 impl<'a> Trace<'a> {
+    /// The logs as they were read.
+    pub(super) fn readings(&self) -> impl Iterator<Item = &Readings> {
+        self.pieces.iter().map(|piece| &piece.readings)
+    }
+
     /// Rows of the logs; where none are held out, of each log its last third is.
     pub(super) fn new(robot: &'a RobotModel, training: Vec<Readings>, held_out: Vec<Readings>) -> Self {
         let dt_s = training.first().map_or(1e-3, |readings| readings.dt_s);
