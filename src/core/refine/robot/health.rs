@@ -262,13 +262,13 @@ fn one_torque_off(readings: &Readings) -> Option<HealthFinding> {
     let [left, right] = &readings.torque_nm;
     let (slope, correlation) = relation(left, right);
     let problem = if correlation < -ALIKE {
-        "runs against the left motor's torque: the sign of one of them is wrong".to_owned()
+        "runs against torque_left_nm: the sign of one of them is wrong".to_owned()
     } else if correlation > ALIKE && !(1.0 / MANY..MANY).contains(&slope) {
-        format!("is {slope:.3} times the left motor's torque: the unit of one of them is wrong")
+        format!("is {slope:.3} times torque_left_nm: the unit of one of them is wrong")
     } else {
         return None;
     };
-    let mend = "map the column that is off, --map torque_right_nm=torque_right_nm*FACTOR";
+    let mend = "map the one that is off, --map torque_left_nm=torque_left_nm*FACTOR or --map torque_right_nm=torque_right_nm*FACTOR";
     Some(finding(Severity::Error, "torque_right_nm", problem, mend))
 }
 
