@@ -11,12 +11,13 @@ const SETTLING: usize = 3;
 /// Times that every parameter is moved.
 const ROUNDS: usize = 5;
 
-/// The least value of a shape that a search goes down to: two steps below where it begins. What is finer, a log of a robot
-/// does not resolve, and friction next to rest is free anyhow.
+/// The least value of a shape that a search goes down to: a step below where it begins, two where it begins at one value
+/// alone, in the middle. What is finer, a log of a robot does not resolve, and friction next to rest is free anyhow.
 fn finest(parameter: &Parameter) -> f64 {
     match (parameter.grid, parameter.step) {
+        (Grid::Values([value]), Step::Factor(factor)) if !parameter.sized => value / (factor * factor),
         (Grid::Values(values), Step::Factor(factor)) if !parameter.sized => {
-            values.iter().copied().fold(f64::INFINITY, f64::min) / (factor * factor)
+            values.iter().copied().fold(f64::INFINITY, f64::min) / factor
         }
         _ => f64::NEG_INFINITY,
     }
