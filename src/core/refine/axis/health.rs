@@ -1,9 +1,12 @@
 //! What makes a log unfit to refine an axis with, said before any effect is named.
 
+use std::ops::Range;
+
 use crate::record::{self, HealthFinding, Log, Severity};
 use crate::refine::rates;
 use crate::refine::select::{Blocks, Member};
 
+use super::dead;
 use super::rig::{Declared, Nuisance};
 use super::trace::{Part, Rows};
 
@@ -19,12 +22,10 @@ const COHERENT_WITH_GEAR: f64 = 0.3;
 const COHERENT_ALONE: f64 = 0.8;
 /// Degrees in a radian, 1/s of a rev/min, and powers of ten: factors of a unit and of no gear.
 const UNITS: [f64; 5] = [57.296, 9.549, 10.0, 100.0, 1000.0];
+/// Share of the acceleration that is not in the column of the speed from which on they have nothing to do with each other.
+const INCOHERENT: f64 = 0.5;
 /// Share of rows at a limit above which an effort is cut off.
-const CUT_OFF: f64 = 0.2;
-/// Share of a log for which a position stands still, and of the width of the effort elsewhere that it then has, from
-/// which on the sensor is dead.
-const DEAD: f64 = 0.2;
-const AS_BEFORE: f64 = 0.8;
+const CUT_OFF: f64 = 0.1;
 /// How many times beyond the speeds that friction was told from a log may go.
 const FASTER: f64 = 1.5;
 /// Share of the highest speed below which the lowest is next to rest.
@@ -75,17 +76,20 @@ pub(super) fn check<'a>(logs: impl IntoIterator<Item = &'a Log>, declared: &Decl
             }
         }
         let efforts = column(names.effort);
-        found.extend(dead_part(column("time_s"), column(names.position), efforts).map(|[from_s, to_s]| {
-            finding(
-                Severity::Error,
-                names.position,
-                format!(
-                    "the value stays the same from {from_s:.1} to {to_s:.1} s while the effort goes on as before: the sensor \
-                     is dead there"
-                ),
-                "check the sensor and its cable, or cut the log to the part before",
-            )
-        }));
+        let (times, positions) = (column("time_s"), column(names.position));
+        let dead = |name: &str, rows: Range<usize>, goes_on: &str| {
+            let [from_s, to_s] = [times[rows.start], times[rows.end - 1]];
+            let problem = format!(
+                "the value stays the same from {from_s:.1} to {to_s:.1} s while {goes_on} goes on as before: the sensor is \
+                 dead there"
+            );
+            let mend = "check the sensor and its cable, or cut the log to the part before";
+            finding(Severity::Error, name, problem, mend)
+        };
+        found.extend(dead::position(positions, efforts).map(|rows| dead(names.position, rows, "the effort")));
+        // A load swings without a torque.
+        let effort = dead::effort(positions, efforts).filter(|_| declared.gravity == 0.0);
+        found.extend(effort.map(|rows| dead(names.effort, rows, "the motion")));
         let share = share_at_limits(efforts);
         if share > CUT_OFF {
             found.push(finding(
@@ -100,28 +104,6 @@ pub(super) fn check<'a>(logs: impl IntoIterator<Item = &'a Log>, declared: &Decl
         }
     }
     found
-}
-
-/// Times, in s, between which a position stands still though the effort does there what it does elsewhere.
-fn dead_part(time_s: &[f64], position: &[f64], effort: &[f64]) -> Option<[f64; 2]> {
-    let mut start = 0;
-    let runs = position.chunk_by(|a, b| a == b).map(|run| {
-        start += run.len();
-        start - run.len()..start
-    });
-    let longest = runs.max_by_key(ExactSizeIterator::len)?;
-    let all = position.len();
-    if (longest.len() as f64) < DEAD * all as f64 || longest.len() == all || effort.len() != all {
-        return None;
-    }
-    let width = |values: &mut dyn Iterator<Item = &f64>| {
-        let [low, high] =
-            values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &v| [low.min(v), high.max(v)]);
-        high - low
-    };
-    let inside = width(&mut effort[longest.clone()].iter());
-    let outside = width(&mut effort[..longest.start].iter().chain(&effort[longest.end..]));
-    (inside > AS_BEFORE * outside).then(|| [time_s[longest.start], time_s[longest.end - 1]])
 }
 
 /// The finding that the motion does not tell the parameters apart.
@@ -174,7 +156,15 @@ pub(super) fn check_rows(
         let mend = "record motion at several speeds in both directions";
         found.push(finding(Severity::Error, names.position, problem, mend));
     }
-    if let Some(speed) = rows.agreement.filter(|agreement| agreement.incoherent < 0.5) {
+    if rows.agreement.is_some_and(|agreement| agreement.incoherent >= INCOHERENT) {
+        let problem = format!(
+            "the speed does not follow the change of `{}`: a dead or mistaken sensor",
+            names.position
+        );
+        let mend = "nothing has to be done: the speed is taken from the position";
+        found.push(finding(Severity::Warning, names.speed, problem, mend));
+    }
+    if let Some(speed) = rows.agreement.filter(|agreement| agreement.incoherent < INCOHERENT) {
         let map = |factor: f64| format!("read it with --map {0}={0}*{factor:.4}", names.speed);
         if (speed.factor - 1.0).abs() > 0.05 {
             let problem = format!(
@@ -229,7 +219,7 @@ fn is_unit(ratio: f64) -> bool {
 
 /// The finding that the column of the speed is that of a motor before a gear, and so is the effort beside it.
 fn before_a_gear(rows: &Rows, declared: &Declared) -> Option<HealthFinding> {
-    let ratio = rows.agreement.filter(|speed| speed.incoherent < 0.5)?.factor;
+    let ratio = rows.agreement.filter(|speed| speed.incoherent < INCOHERENT)?.factor;
     if (RIGHT_UNIT[0]..=RIGHT_UNIT[1]).contains(&ratio) || is_unit(ratio) {
         return None;
     }

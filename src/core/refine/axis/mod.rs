@@ -2,6 +2,7 @@
 
 mod candidates;
 mod carried;
+mod dead;
 mod errors;
 mod floor;
 mod health;

@@ -159,7 +159,14 @@ fn logs_that_cannot_answer_are_told_before_any_effect() {
             "the sensor is dead",
         ),
         ("dead torque", with("torque_nm", &|_, _| 0.01), "torque_nm", "does not change"),
+        (
+            "torque dies",
+            with("torque_nm", &|row, v| if row < 15_000 { v } else { 0.0 }),
+            "torque_nm",
+            "the sensor is dead",
+        ),
         ("clipped", with("torque_nm", &|_, v| v.clamp(-0.03, 0.03)), "torque_nm", "cut off"),
+        ("seldom clipped", with("torque_nm", &|_, v| v.clamp(-0.045, 0.045)), "torque_nm", "cut off"),
         ("slow", every(30), "time_s", "too few"),
         ("short", first(600), "motor_angle_rad", "are needed"),
         (

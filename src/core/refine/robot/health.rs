@@ -23,6 +23,8 @@ const SLOWEST_S: f64 = 0.0101;
 /// A wheel that stands so long while the other one turns so far has no sensor.
 const DEAD_S: f64 = 0.5;
 const DEAD_RAD: f64 = 0.1;
+/// Of the range of the other motor's torque, what it goes through meanwhile.
+const DEAD_TORQUE: f64 = 0.25;
 /// Correlation of both torques from which on one must not be the other turned round, or many times it.
 const ALIKE: f64 = 0.7;
 const MANY: f64 = 5.0;
@@ -228,17 +230,15 @@ fn most_torque_nm(robot: &RobotModel) -> f64 {
     robot.limits.torque_nm.map_or(weight_n * (p.com_height_m + p.wheel_radius_m), |limit| MANY * limit)
 }
 
-/// A wheel's angle that stays where it is for long while the other one goes on.
+/// A wheel's angle, or a motor's torque, that stays where it is for long while the other one goes on.
 fn died(readings: &Readings) -> Option<HealthFinding> {
-    let names = ["motor_angle_left_rad", "motor_angle_right_rad"];
     let travel = |column: &[f64]| {
         let [low, high] = column
             .iter()
             .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &q| [low.min(q), high.max(q)]);
         high - low
     };
-    let of = |motor: usize| {
-        let (own, other) = (&readings.angle_rad[motor], &readings.angle_rad[1 - motor]);
+    let stays = |own: &[f64], other: &[f64], least: f64| {
         let mut start = 0;
         let runs = own.chunk_by(|a, b| a == b).map(|run| {
             start += run.len();
@@ -246,13 +246,26 @@ fn died(readings: &Readings) -> Option<HealthFinding> {
         });
         let longest = runs.max_by_key(ExactSizeIterator::len)?;
         let seconds = longest.len() as f64 * readings.dt_s;
-        let dead = seconds > DEAD_S && travel(&other[longest.clone()]) > DEAD_RAD;
+        (seconds > DEAD_S && travel(&other[longest.clone()]) > least)
+            .then_some([seconds, longest.start as f64 * readings.dt_s])
+    };
+    let told = |name: &str, [seconds, start_s]: [f64; 2], other: &str| {
         let problem = format!(
-            "stays the same for {seconds:.1} s from {:.1} s on while the other wheel goes on: the sensor is dead there",
-            longest.start as f64 * readings.dt_s
+            "stays the same for {seconds:.1} s from {start_s:.1} s on while the other {other} goes on: the sensor is dead \
+             there"
         );
         let mend = "check the sensor and its cable, or cut the log to the part before";
-        dead.then(|| finding(Severity::Error, names[motor], problem, mend))
+        finding(Severity::Error, name, problem, mend)
+    };
+    let of = |motor: usize| {
+        let side = ["left", "right"][motor];
+        let [angles, torques] = [&readings.angle_rad, &readings.torque_nm]
+            .map(|both| [both[motor].as_slice(), both[1 - motor].as_slice()]);
+        let wheel = stays(angles[0], angles[1], DEAD_RAD);
+        let torque = || stays(torques[0], torques[1], DEAD_TORQUE * travel(torques[1]));
+        wheel
+            .map(|rows| told(&format!("motor_angle_{side}_rad"), rows, "wheel"))
+            .or_else(|| torque().map(|rows| told(&format!("torque_{side}_nm"), rows, "torque")))
     };
     (0..2).find_map(of)
 }

@@ -76,6 +76,12 @@ fn bad_logs_are_told_before_any_effect() {
         ),
         ("dead pitch", with(&log, &pitch, |_, _| 0.01), "pitch_rad", "never changes"),
         ("constant torque", with(&log, &torques[..1], |_, _| 0.1), "torque_left_nm", "never changes"),
+        (
+            "torque dies",
+            with(&log, &torques[..1], |row, v| if row < 6000 { v } else { 0.0 }),
+            "torque_left_nm",
+            "dead",
+        ),
         ("clipped", with(&log, &torques, |_, v| v.clamp(-0.05, 0.05)), "torque_left_nm", "at the limit"),
         ("33 rows a second", thinned(&log, |row| row % 30 == 0), "time_s", "too few"),
         ("short", thinned(&log, |row| row < 2000), "time_s", "too short"),
@@ -109,7 +115,10 @@ fn good_logs_have_no_swapped_sides() {
         let readings = super::Readings::new(&log).unwrap();
         let found = super::of_signals(&log, &readings, presets::paper().robot().unwrap());
         let told = |part: &str| found.iter().any(|finding| finding.problem.contains(part));
-        assert!(!told("the other wheel") && !told("of one of them"), "{scenario:?}: {found:#?}");
+        assert!(
+            !told("the other wheel") && !told("the other torque") && !told("of one of them"),
+            "{scenario:?}: {found:#?}"
+        );
         assert_eq!(super::crosswise(&readings), None, "{scenario:?}");
     }
 }
