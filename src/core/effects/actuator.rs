@@ -21,7 +21,7 @@ pub(super) static COMMAND_DELAY: EffectKind = EffectKind {
     parameters: &[Parameter::shape("delay_s", [0.0, 0.5], "time from asking to acting")
         .sized()
         .tried(TIMES, Step::Factor(1.3))],
-    series: false,
+    wave: None,
     trial: Trial::PLAIN,
     make_terms: |_, shape| {
         let mut line = DelayLine::new(shape[0]);
@@ -41,7 +41,7 @@ pub(super) static ACTUATOR_LAG: EffectKind = EffectKind {
     parameters: &[Parameter::shape("time_constant_s", [1e-5, 1.0], "time to 63 % of a step")
         .sized()
         .tried(TIMES, Step::Factor(1.3))],
-    series: false,
+    wave: None,
     trial: Trial::PLAIN,
     make_terms: |_, shape| {
         let mut lag = Lag::new(shape[0]);
@@ -59,7 +59,7 @@ pub(super) static TORQUE_GAIN: EffectKind = EffectKind {
     place: Place::Actuator,
     machines: EVERYWHERE,
     parameters: &[Parameter::amplitude("gain", [-0.9, 10.0], "share of the torque that is added to it")],
-    series: false,
+    wave: None,
     trial: Trial::PLAIN,
     make_terms: |_, _| vec![Term::new("gain", |m: &Moment| Action::motor(m.torque_nm))],
     separated_by: "a known payload, or a known weight on a lever",
@@ -76,7 +76,7 @@ pub(super) static TORQUE_SATURATION: EffectKind = EffectKind {
     parameters: &[Parameter::shape("limit_nm", [1e-4, 1000.0], "largest torque")
         .linear("limit_n", [1e-3, 1e6])
         .tried(Grid::OfTorque(&[0.5, 0.6, 0.7, 0.8, 0.9]), Step::Factor(1.08))],
-    series: false,
+    wave: None,
     trial: Trial::PLAIN,
     make_terms: |_, shape| {
         let limit = shape[0];
@@ -97,7 +97,7 @@ pub(super) static TORQUE_DEADZONE: EffectKind = EffectKind {
     parameters: &[Parameter::shape("width_nm", [0.0, 10.0], "torque up to which nothing acts")
         .linear("width_n", [0.0, 1e4])
         .tried(Grid::Values(&[0.01, 0.02, 0.04, 0.08]), Step::Factor(1.4))],
-    series: false,
+    wave: None,
     trial: Trial::cautious(1.6),
     make_terms: |_, shape| {
         let width = shape[0];
@@ -124,7 +124,7 @@ pub(super) static BACKLASH: EffectKind = EffectKind {
             .linear("rotor_mass_kg", [1e-4, 1e3])
             .tried(Grid::OfWheelInertia(0.2), Step::Fixed),
     ],
-    series: false,
+    wave: None,
     trial: Trial::cautious(1.6),
     make_terms: |_, shape| {
         let mut gap = Gap { width: shape[0], inertia: shape[1], place: None, speed: 0.0 };

@@ -17,7 +17,7 @@ pub(super) static PITCH_OFFSET: EffectKind = EffectKind {
     place: Place::Pitch,
     machines: ROBOT,
     parameters: &[Parameter::amplitude("angle_rad", [-0.5, 0.5], "angle by which it is in front")],
-    series: false,
+    wave: None,
     trial: Trial::PLAIN,
     make_terms: |machine, _| {
         let p = machine.parameters;
@@ -42,7 +42,7 @@ pub(super) static STRUCTURAL_MODE: EffectKind = EffectKind {
             .tried(Grid::Values(&[0.04]), Step::Factor(1.6)),
         Parameter::amplitude("share", [-2.0, 2.0], "share of the torque that it takes").opposing(),
     ],
-    series: false,
+    wave: None,
     trial: Trial { repeats: true, forms: &[Form::Law, Form::Driven], ..Trial::cautious(6.0) },
     make_terms: |machine, shape| {
         let mut mode = Oscillator::new(shape[0], shape[1]);
@@ -77,7 +77,7 @@ pub(super) static SLOSH: EffectKind = EffectKind {
             .tried(Grid::OfHeight(&[1.0]), Step::OfHeight(0.3)),
         Parameter::amplitude("mass_kg", [0.0, 100.0], "how much of the declared mass moves"),
     ],
-    series: false,
+    wave: None,
     trial: Trial::PLAIN,
     make_terms: |machine, shape| {
         let mut mass = Oscillator::new(shape[0], shape[1]);

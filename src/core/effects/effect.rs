@@ -89,7 +89,7 @@ impl Effect {
         amplitudes: &[f64],
     ) -> Result<Self, EffectError> {
         let count = |role| kind.parameters.iter().filter(|parameter| parameter.role == role).count().max(1);
-        let members = if kind.series { shape.len() / count(Role::Shape) } else { 1 };
+        let members = if kind.series() { shape.len() / count(Role::Shape) } else { 1 };
         let (mut shapes, mut sizes) = (shape.iter(), amplitudes.iter());
         let mut values = Vec::new();
         for (key, parameter) in keys(kind, machine, members) {
@@ -109,7 +109,7 @@ impl Effect {
     #[must_use]
     pub fn turned(&self, turn_rad: f64) -> Self {
         let mut turned = self.clone();
-        if self.kind.series {
+        if self.kind.series() {
             for member in turned.parameters.chunks_exact_mut(self.kind.parameters.len()) {
                 let [(_, order), (_, cos), (_, sin)] = member else { continue };
                 let (s, c) = (*order * turn_rad).sin_cos();
@@ -280,7 +280,7 @@ fn members<'a>(kind: &EffectKind, machine: MachineKind, given: impl Iterator<Ite
             (number <= MOST_MEMBERS).then_some(number)
         })
     };
-    if kind.series { given.filter_map(number).max().unwrap_or(1).max(1) } else { 1 }
+    if kind.series() { given.filter_map(number).max().unwrap_or(1).max(1) } else { 1 }
 }
 
 /// Most members of a series; more are a mistyped number.
@@ -289,7 +289,7 @@ const MOST_MEMBERS: usize = 64;
 fn unknown_key(kind: &EffectKind, machine: MachineKind, unknown: &str) -> EffectError {
     let known: Vec<String> =
         kind.parameters.iter().map(|parameter| parameter.key(machine).replace('#', "1")).collect();
-    let more = if kind.series { " and so on with 2, 3, …" } else { "" };
+    let more = if kind.series() { " and so on with 2, 3, …" } else { "" };
     let problem = format!("{} has no parameter {unknown}: use {}{more}", kind.id, known.join(", "));
     EffectError::at(unknown, problem)
 }

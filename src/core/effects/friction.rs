@@ -19,7 +19,7 @@ pub(super) static QUADRATIC_DRAG: EffectKind = EffectKind {
     parameters: &[Parameter::amplitude("drag_nm_s2_rad2", [-1.0, 1.0], "torque at 1 rad/s")
         .linear("drag_n_s2_m2", [-1e5, 1e5])
         .opposing()],
-    series: false,
+    wave: None,
     trial: Trial::PLAIN,
     make_terms: |machine, _| {
         vec![Term::new(QUADRATIC_DRAG.parameters[0].key(machine.kind), |m: &Moment| {
@@ -43,7 +43,7 @@ pub(super) static VISCOUS_ASYMMETRY: EffectKind = EffectKind {
         "by how much it is larger forward, and smaller backward",
     )
     .linear("viscous_n_s_m", [-1e5, 1e5])],
-    series: false,
+    wave: None,
     trial: Trial { forms: &[Form::Law, Form::Forward(&VISCOUS_ERROR)], ..Trial::PLAIN },
     make_terms: |machine, _| {
         vec![Term::new(VISCOUS_ASYMMETRY.parameters[0].key(machine.kind), |m: &Moment| {
@@ -67,7 +67,7 @@ pub(super) static FRICTION_ASYMMETRY: EffectKind = EffectKind {
         "by how much it is larger forward, and smaller backward",
     )
     .linear("coulomb_n", [-1e4, 1e4])],
-    series: false,
+    wave: None,
     trial: Trial { forms: &[Form::Law, Form::Forward(&COULOMB_ERROR)], ..Trial::PLAIN },
     make_terms: |machine, _| {
         vec![Term::new(FRICTION_ASYMMETRY.parameters[0].key(machine.kind), |_: &Moment| Action::motor(-1.0))]
@@ -89,7 +89,7 @@ pub(super) static LOW_SPEED_FRICTION: EffectKind = EffectKind {
             .tried(Grid::Values(&[0.3, 0.7, 1.5]), Step::Factor(1.5)),
         Parameter::amplitude("level_nm", [-5.0, 5.0], "level at rest").linear("level_n", [-1e4, 1e4]),
     ],
-    series: false,
+    wave: None,
     trial: Trial::cautious(1.6),
     make_terms: |machine, shape| {
         let scale = shape[0];
@@ -113,7 +113,7 @@ pub(super) static LOAD_DEPENDENT_FRICTION: EffectKind = EffectKind {
         [0.0, 1.0],
         "level as a share of the torque's magnitude",
     )],
-    series: false,
+    wave: None,
     trial: Trial::PLAIN,
     make_terms: |_, _| vec![Term::new("coefficient", |m: &Moment| Action::friction(m.torque_nm.abs()))],
     separated_by: "several loads at one speed",
@@ -133,7 +133,7 @@ pub(super) static THERMAL_FRICTION: EffectKind = EffectKind {
         Parameter::amplitude("fall_nm", [-5.0, 5.0], "by how much the level falls in the end")
             .linear("fall_n", [-1e4, 1e4]),
     ],
-    series: false,
+    wave: None,
     trial: Trial::PLAIN,
     make_terms: |machine, shape| {
         let time_constant_s = shape[0];
@@ -159,7 +159,7 @@ pub(super) static PRESLIDING: EffectKind = EffectKind {
         Parameter::amplitude("level_nm", [0.0, 5.0], "level that builds up, part of the declared one")
             .linear("level_n", [0.0, 1e4]),
     ],
-    series: false,
+    wave: None,
     trial: Trial::cautious(1.6),
     make_terms: |machine, shape| {
         let way = shape[0];
@@ -191,7 +191,7 @@ pub(super) static COULOMB_ERROR: EffectKind = EffectKind {
         "what is added to coulomb and static level",
     )
     .linear("coulomb_n", [-1e4, 1e4])],
-    series: false,
+    wave: None,
     trial: Trial::PLAIN,
     make_terms: |machine, _| {
         vec![Term::new(COULOMB_ERROR.parameters[0].key(machine.kind), |_: &Moment| Action::friction(1.0))]
@@ -215,7 +215,7 @@ pub(super) static VISCOUS_ERROR: EffectKind = EffectKind {
     machines: EVERYWHERE,
     parameters: &[Parameter::amplitude("viscous_nm_s_rad", [-10.0, 10.0], "what is added to it")
         .linear("viscous_n_s_m", [-1e5, 1e5])],
-    series: false,
+    wave: None,
     trial: Trial::PLAIN,
     make_terms: |machine, _| {
         vec![Term::new(VISCOUS_ERROR.parameters[0].key(machine.kind), |m: &Moment| {

@@ -27,12 +27,10 @@ pub(super) static COGGING: EffectKind = EffectKind {
         Parameter::amplitude("cos_#_nm", [-20.0, 20.0], "cosine part").linear("cos_#_n", [-1e4, 1e4]),
         Parameter::amplitude("sin_#_nm", [-20.0, 20.0], "sine part").linear("sin_#_n", [-1e4, 1e4]),
     ],
-    series: true,
+    wave: Some(cogging),
     trial: Trial::PLAIN,
     make_terms: |machine, shape| {
-        harmonics(machine, shape, ["cos_#_nm", "sin_#_nm"], ["cos_#_n", "sin_#_n"], |wave, _| {
-            Action::motor(wave)
-        })
+        harmonics(machine, shape, ["cos_#_nm", "sin_#_nm"], ["cos_#_n", "sin_#_n"], cogging)
     },
     separated_by: "slow turns in both directions, some turns each, with the wheel in the air",
     feedforward: Feedforward::Causal,
@@ -50,11 +48,11 @@ pub(super) static TORQUE_RIPPLE: EffectKind = EffectKind {
         Parameter::amplitude("cos_#", [-1.0, 1.0], "cosine part as a share of the torque"),
         Parameter::amplitude("sin_#", [-1.0, 1.0], "sine part as a share of the torque"),
     ],
-    series: true,
+    wave: Some(ripple),
     trial: Trial::PLAIN,
     make_terms: |machine, shape| {
         let keys = ["cos_#", "sin_#"];
-        harmonics(machine, shape, keys, keys, |wave, moment| Action::motor(wave * moment.torque_nm))
+        harmonics(machine, shape, keys, keys, ripple)
     },
     separated_by: "two levels of torque at one speed",
     feedforward: Feedforward::Causal,
@@ -72,16 +70,27 @@ pub(super) static POSITION_DEPENDENT_FRICTION: EffectKind = EffectKind {
         Parameter::amplitude("cos_#_nm", [-5.0, 5.0], "cosine part").linear("cos_#_n", [-1e4, 1e4]),
         Parameter::amplitude("sin_#_nm", [-5.0, 5.0], "sine part").linear("sin_#_n", [-1e4, 1e4]),
     ],
-    series: true,
+    wave: Some(friction),
     trial: Trial::PLAIN,
     make_terms: |machine, shape| {
-        let action = |wave, _: &Moment| Action::friction(wave);
-        harmonics(machine, shape, ["cos_#_nm", "sin_#_nm"], ["cos_#_n", "sin_#_n"], action)
+        harmonics(machine, shape, ["cos_#_nm", "sin_#_nm"], ["cos_#_n", "sin_#_n"], friction)
     },
     separated_by: "slow turns in both directions: friction changes its sign with the direction, cogging does not",
     feedforward: Feedforward::Causal,
     declare: undeclared,
 };
+
+fn cogging(wave: f64, _: &Moment) -> Action {
+    Action::motor(wave)
+}
+
+fn ripple(wave: f64, moment: &Moment) -> Action {
+    Action::motor(wave * moment.torque_nm)
+}
+
+fn friction(wave: f64, _: &Moment) -> Action {
+    Action::friction(wave)
+}
 
 /// Two terms for each order, or period on a linear axis: an action of cos and of sin.
 fn harmonics(
@@ -89,7 +98,7 @@ fn harmonics(
     shape: &[f64],
     keys: [&str; 2],
     linear_keys: [&str; 2],
-    action: impl Fn(f64, &Moment) -> Action + Copy + Send + Sync + 'static,
+    action: fn(f64, &Moment) -> Action,
 ) -> Vec<Term> {
     let linear = machine.kind == MachineKind::Linear;
     let keys = if linear { linear_keys } else { keys };

@@ -1,7 +1,7 @@
 //! What the library knows of a kind of effect.
 
 use super::effect::Effect;
-use super::law::Term;
+use super::law::{Action, Moment, Term};
 use super::machine::{Machine, MachineKind};
 use crate::model_file::{AxisModel, RobotModel};
 
@@ -267,8 +267,9 @@ pub struct EffectKind {
     pub machines: &'static [MachineKind],
     /// Parameters in the order of the model file: of a series those of its first member.
     pub parameters: &'static [Parameter],
-    /// Whether the parameters repeat, numbered from 1, as harmonics do.
-    pub series: bool,
+    /// What a wave of the machine's angle does at a moment, in proportion to it; of a series of harmonics, whose
+    /// parameters repeat, numbered from 1.
+    pub wave: Option<fn(f64, &Moment) -> Action>,
     /// How a search goes about it.
     pub trial: Trial,
     /// Its terms on a machine at shape parameters, which stand in the order of the parameters.
@@ -308,7 +309,12 @@ impl EffectKind {
 
     /// Whether it depends on the rotor's own angle.
     pub fn by_angle(&self) -> bool {
-        self.place == Place::Motor && self.series
+        self.place == Place::Motor && self.series()
+    }
+
+    /// Whether the parameters repeat, numbered from 1, as harmonics do.
+    pub fn series(&self) -> bool {
+        self.wave.is_some()
     }
 
     /// Whether it can be on a machine.

@@ -16,7 +16,7 @@ pub(super) static MASS_ERROR: EffectKind = EffectKind {
     place: Place::Parameter,
     machines: ROBOT,
     parameters: &[Parameter::amplitude("mass_kg", [-100.0, 100.0], "what is added to it")],
-    series: false,
+    wave: None,
     trial: Trial::PLAIN,
     make_terms: |machine, _| {
         let (height, gravity) = (machine.parameters.com_height_m, machine.parameters.gravity_m_s2);
@@ -45,7 +45,7 @@ pub(super) static COM_HEIGHT_ERROR: EffectKind = EffectKind {
     place: Place::Parameter,
     machines: ROBOT,
     parameters: &[Parameter::amplitude("height_m", [-3.0, 3.0], "what is added to it, to first order")],
-    series: false,
+    wave: None,
     trial: Trial::PLAIN,
     make_terms: |machine, _| {
         let RobotParameters { body_mass_kg: mass, com_height_m: height, gravity_m_s2: gravity, .. } =
@@ -75,7 +75,7 @@ pub(super) static BODY_INERTIA_ERROR: EffectKind = EffectKind {
     place: Place::Parameter,
     machines: ROBOT,
     parameters: &[Parameter::amplitude("inertia_kg_m2", [-100.0, 100.0], "what is added to it")],
-    series: false,
+    wave: None,
     trial: Trial::PLAIN,
     make_terms: |_, _| vec![Term::new("inertia_kg_m2", |m: &Moment| Action::body(-m.pitch_accel_rad_s2))],
     separated_by: "the period of the body as a pendulum, hung up by the axle",
@@ -94,7 +94,7 @@ pub(super) static INERTIA_ERROR: EffectKind = EffectKind {
     machines: &[MachineKind::Robot, MachineKind::Rotary, MachineKind::Linear],
     parameters: &[Parameter::amplitude("inertia_kg_m2", [-100.0, 100.0], "what is added to it")
         .linear("mass_kg", [-1e4, 1e4])],
-    series: false,
+    wave: None,
     trial: Trial::PLAIN,
     make_terms: |machine, _| {
         let key = INERTIA_ERROR.parameters[0].key(machine.kind);

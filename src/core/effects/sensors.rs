@@ -12,7 +12,7 @@ pub(super) static GYRO_BIAS: EffectKind = EffectKind {
     place: Place::Sensor,
     machines: ROBOT,
     parameters: &[Parameter::amplitude("rate_rad_s", [-1.0, 1.0], "what is added to the pitch rate")],
-    series: false,
+    wave: None,
     trial: Trial::PLAIN,
     make_terms: |_, _| Vec::new(),
     separated_by: "a log of the robot at rest",
@@ -33,7 +33,7 @@ pub(super) static IMU_DELAY: EffectKind = EffectKind {
     parameters: &[Parameter::shape("delay_s", [0.0, 0.5], "age of a reading when it arrives")
         .sized()
         .tried(Grid::Values(&[1.5e-3, 3e-3, 5e-3, 8e-3, 12e-3, 18e-3]), Step::Factor(1.2))],
-    series: false,
+    wave: None,
     trial: Trial { forms: &[Form::Late], ..Trial::PLAIN },
     make_terms: |_, _| Vec::new(),
     separated_by: "the wheels chocked and the body rocked: then the motors turn as the body does, backward",

@@ -26,7 +26,7 @@ pub(super) static TETHER_SPRING: EffectKind = EffectKind {
         .opposing(),
         Parameter::amplitude("pull_n", [-1e3, 1e3], "force at x = 0").or(0.0),
     ],
-    series: false,
+    wave: None,
     trial: Trial::PLAIN,
     make_terms: |_, _| {
         vec![
@@ -46,7 +46,7 @@ pub(super) static GROUND_SLOPE: EffectKind = EffectKind {
     place: Place::Translation,
     machines: ROBOT,
     parameters: &[Parameter::amplitude("slope_rad", [-0.5, 0.5], "slope, whose sine is taken to be itself")],
-    series: false,
+    wave: None,
     trial: Trial::PLAIN,
     make_terms: |machine, _| {
         let weight_n = machine.weight_n();
@@ -69,7 +69,7 @@ pub(super) static AERO_DRAG: EffectKind = EffectKind {
             .tried(Grid::OfHeight(&[0.0, 1.0]), Step::Fixed),
         Parameter::amplitude("drag_n_s2_m2", [-1e3, 1e3], "force at 1 m/s").opposing(),
     ],
-    series: false,
+    wave: None,
     trial: Trial::PLAIN,
     make_terms: |_, shape| {
         let height_m = shape[0];
@@ -91,7 +91,7 @@ pub(super) static ROLLING_RESISTANCE: EffectKind = EffectKind {
     parameters: &[
         Parameter::amplitude("coefficient", [-0.5, 0.5], "force as a share of the weight").opposing()
     ],
-    series: false,
+    wave: None,
     trial: Trial::PLAIN,
     make_terms: |machine, _| {
         let weight_n = machine.weight_n();
@@ -114,7 +114,7 @@ pub(super) static WHEEL_ECCENTRICITY: EffectKind = EffectKind {
         Parameter::amplitude("cos_m", [-0.1, 0.1], "eccentricity, part in phase with cos(x/r)"),
         Parameter::amplitude("sin_m", [-0.1, 0.1], "part in phase with sin(x/r)"),
     ],
-    series: false,
+    wave: None,
     trial: Trial::PLAIN,
     make_terms: |machine, _| {
         let radius_m = machine.parameters.wheel_radius_m;
@@ -141,7 +141,7 @@ pub(super) static WHEEL_SLIP: EffectKind = EffectKind {
             .tried(Grid::Values(&[0.005, 0.02]), Step::Factor(1.6)),
         Parameter::amplitude("slip_m_s_n", [0.0, 1.0], "slip speed per force"),
     ],
-    series: false,
+    wave: None,
     trial: Trial::cautious(2.0),
     make_terms: |machine, shape| {
         let p = machine.parameters;
@@ -176,7 +176,7 @@ pub(super) static TERRAIN: EffectKind = EffectKind {
             .tried(Grid::Values(&[0.04, 0.1, 0.25]), Step::Factor(1.25)),
         Parameter::amplitude("height_m", [-0.5, 0.5], "height of its middle"),
     ],
-    series: false,
+    wave: None,
     trial: Trial { repeats: true, forms: &[Form::Law, Form::Wave], ..Trial::cautious(1.3) },
     make_terms: |machine, shape| {
         let (weight_n, at_m, width_m) = (machine.weight_n(), shape[0], shape[1]);
@@ -204,7 +204,7 @@ pub(super) static EXTERNAL_PUSH: EffectKind = EffectKind {
         Parameter::shape("height_m", [-1.0, 3.0], "its height above the axle along the body").or(0.0),
         Parameter::amplitude("force_n", [-1e4, 1e4], "force, forward positive"),
     ],
-    series: false,
+    wave: None,
     trial: Trial { repeats: true, brief: true, ..Trial::cautious(4.0) },
     make_terms: |_, shape| {
         let (start_s, end_s, height_m) = (shape[0], shape[0] + shape[1], shape[2]);

@@ -38,7 +38,7 @@ fn inside([lowest, highest]: [f64; 2], rng: &mut ChaCha8Rng) -> f64 {
 /// Shape parameters of `members` members and amplitudes, drawn from their ranges.
 fn drawn(kind: &EffectKind, on: MachineKind, members: usize, rng: &mut ChaCha8Rng) -> (Vec<f64>, Vec<f64>) {
     let (mut shape, mut sizes) = (Vec::new(), Vec::new());
-    for _ in 0..if kind.series { members } else { 1 } {
+    for _ in 0..if kind.series() { members } else { 1 } {
         for parameter in kind.parameters {
             let value = inside(parameter.range(on), rng);
             let value = if parameter.whole && on != MachineKind::Linear { value.round() } else { value };
@@ -85,7 +85,7 @@ fn ids_are_unique_and_every_kind_tells_about_itself() {
             assert!(reason.len() > 10, "{}", kind.id);
         }
         let numbered = kind.parameters.iter().all(|p| MACHINES.iter().all(|&on| p.key(on).contains('#')));
-        assert_eq!(numbered, kind.series, "{}", kind.id);
+        assert_eq!(numbered, kind.series(), "{}", kind.id);
     }
 }
 

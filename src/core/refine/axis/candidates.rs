@@ -179,7 +179,7 @@ impl Scales {
         let [low, high] =
             grid.iter().fold([f64::INFINITY, 0.0], |[low, high]: [f64; 2], &v| [low.min(v), high.max(v)]);
         match kind.id {
-            _ if kind.series => [0.0, f64::INFINITY],
+            _ if kind.series() => [0.0, f64::INFINITY],
             // Less than a row is the sampling's own.
             "command_delay" | "actuator_lag" => [self.step_s, 2.0 * high],
             "torque_saturation" => [0.5 * low, self.largest_effort],
@@ -207,7 +207,7 @@ pub(super) fn library(
     (wanted, inertia): (&[f64], f64),
 ) -> Vec<Candidate> {
     let mut found = Vec::new();
-    for kind in KINDS.into_iter().filter(|kind| kind.is_on(machine.kind) && !kind.series) {
+    for kind in KINDS.into_iter().filter(|kind| kind.is_on(machine.kind) && !kind.series()) {
         // A springy body is the robot's.
         if kind.id == "structural_mode" {
             continue;

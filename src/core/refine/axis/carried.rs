@@ -29,7 +29,7 @@ const HARM_PERCENT: f64 = 2.0;
 /// any angle: where another zero explains a log much better, it is that of the log and of no model.
 pub(super) fn zeros_rad(declared: &Declared, rows: &Rows) -> Vec<f64> {
     let logs = rows.traces.iter().map(|trace| trace.log + 1).max().unwrap_or(0);
-    let turning: Vec<&Effect> = declared.effects.iter().filter(|effect| effect.kind().series).collect();
+    let turning: Vec<&Effect> = declared.effects.iter().filter(|effect| effect.kind().series()).collect();
     // The load of a pendulum says where the angle counts from.
     if turning.is_empty() || declared.is_linear() || declared.gravity != 0.0 {
         return Vec::new();
@@ -98,7 +98,7 @@ pub(super) fn carried(
             id: effect.id(),
             error_drop_percent: 100.0 * gain.share,
             error_drop_ci95: gain.ci95.map(|share| 100.0 * share),
-            zeros_rad: if effect.kind().series { declared.zeros_rad.clone() } else { Vec::new() },
+            zeros_rad: if effect.kind().series() { declared.zeros_rad.clone() } else { Vec::new() },
         })
     };
     declared.effects.iter().filter_map(worth).collect()

@@ -340,7 +340,7 @@ impl Acting {
     pub(super) fn of(kind: &EffectKind, machine: MachineKind, shape: &[f64]) -> Self {
         let wave = |&shape: &f64| if machine == MachineKind::Linear { TAU / shape } else { shape };
         let finest = shape.iter().map(wave).fold(0.0, f64::max);
-        Self { between: kind.place == Place::Actuator, wave: if kind.series { finest } else { 0.0 } }
+        Self { between: kind.place == Place::Actuator, wave: if kind.series() { finest } else { 0.0 } }
     }
 }
 

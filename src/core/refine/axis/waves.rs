@@ -23,7 +23,7 @@ pub(super) fn strongest(
 ) -> Vec<(&'static EffectKind, Vec<f64>)> {
     let (first, step, last) = wave_numbers(machine.kind, scales);
     let kinds: Vec<&'static EffectKind> =
-        KINDS.into_iter().filter(|kind| kind.series && kind.is_on(machine.kind)).collect();
+        KINDS.into_iter().filter(|kind| kind.series() && kind.is_on(machine.kind)).collect();
     let speed = rows.pick(|trace, sample| trace.speed[sample]);
     let effort = rows.pick(|trace, sample| trace.effort[sample]);
     let residual = whitener.transposed(white_residual, speed.len());

@@ -66,7 +66,7 @@ pub(super) fn shifts(
 fn refitted(known: &Found<'_>, twin: &Twin<'_>, levels: Levels, seed: u64) -> Option<Vec<f64>> {
     let mut trace = twin.trace(levels, seed)?;
     let loads = trace.loads(&known.laws);
-    trace.refill(&loads, 0.0);
+    trace.refill(&loads);
     let target = trace.residual();
     let again = |pick: &Candidate| Candidate::new(&trace, pick.kind, pick.form, pick.shape.clone());
     let mut picks: Vec<Candidate> = known.picks.iter().map(again).collect();

@@ -50,6 +50,21 @@ impl Candidate {
         Self { kind, form, shape, pairs, white: Vec::new() }
     }
 
+    /// At several shapes, which for harmonics are orders next to each other.
+    fn several(trace: &Trace, kind: &'static EffectKind, form: Form, shapes: &[Vec<f64>]) -> Vec<Self> {
+        match (kind.wave, shapes) {
+            (Some(action), [first, ..]) => {
+                let columns = trace.waves(action, first[0], shapes.len());
+                let of = |(shape, pairs): (&Vec<f64>, [Pair; 2])| {
+                    let (shape, pairs) = (shape.clone(), pairs.into());
+                    Self { kind, form, shape, pairs, white: Vec::new() }
+                };
+                shapes.iter().zip(columns).map(of).collect()
+            }
+            _ => shapes.iter().map(|shape| Self::new(trace, kind, form, shape.clone())).collect(),
+        }
+    }
+
     /// How each shape parameter is refined; none where it is not.
     pub(super) fn moves(&self, com_height_m: f64) -> Vec<Option<Move>> {
         let of = |(place, parameter): (usize, &Parameter)| match (self.form, parameter.step) {
@@ -103,12 +118,15 @@ impl Candidate {
 
     /// Whether more than one of the kind can be in a robot.
     pub(super) fn repeats(&self) -> bool {
-        self.kind.series || self.kind.trial.repeats
+        self.kind.series() || self.kind.trial.repeats
     }
 }
 
 /// Highest order whose waves pass the kernel for some of the time.
 const BAND_HZ: f64 = 22.0;
+
+/// Orders of harmonics that one pass over the rows makes.
+const ORDERS_AT_ONCE: usize = 10;
 
 /// Ground waves that are tried: longest and shortest, m, and the factor between neighbours.
 const WAVES_M: [f64; 3] = [2.5, 0.1, 1.1];
@@ -122,13 +140,14 @@ pub(super) fn library(trace: &Trace, threads: NonZeroUsize) -> Vec<Candidate> {
     for kind in KINDS.iter().copied().filter(|kind| kind.is_on(MachineKind::Robot)) {
         for &form in kind.trial.forms {
             let shapes = if form == Form::Wave { waves() } else { reach.shapes(kind) };
-            wanted.extend(shapes.into_iter().map(|shape| (kind, form, shape)));
+            let together = if kind.wave.is_some() { ORDERS_AT_ONCE } else { 1 };
+            wanted.extend(shapes.chunks(together).map(|shapes| (kind, form, shapes.to_vec())));
         }
     }
-    let made = parallel::map(&wanted, threads, |(kind, form, shape)| {
-        Candidate::new(trace, kind, *form, shape.clone())
+    let made = parallel::map(&wanted, threads, |(kind, form, shapes)| {
+        Candidate::several(trace, kind, *form, shapes)
     });
-    made.into_iter().filter(|candidate| !candidate.pairs.is_empty()).collect()
+    made.into_iter().flatten().filter(|candidate| !candidate.pairs.is_empty()).collect()
 }
 
 fn waves() -> Vec<Vec<f64>> {

@@ -96,14 +96,14 @@ pub(super) fn effects(search: &Search<'_>, picks: &[Candidate], fit: &Fit, fitte
     let with = held_out_error(search, picks, fitted);
     let mut found: Vec<Found> = Vec::new();
     for (index, (pick, first)) in placed.iter().enumerate() {
-        if pick.kind.series && found.iter().any(|other| other.effect.kind() == pick.kind) {
+        if pick.kind.series() && found.iter().any(|other| other.effect.kind() == pick.kind) {
             continue;
         }
         let size = |&(pick, first): &(&Candidate, usize)| -> f64 {
             fit.judged.coefficients[first..first + pick.white.len()].iter().map(|v| v * v).sum()
         };
         let mut members = vec![(*pick, *first)];
-        if pick.kind.series {
+        if pick.kind.series() {
             members.extend(placed[index + 1..].iter().filter(|(other, _)| other.kind == pick.kind));
             members.sort_by(|a, b| size(b).total_cmp(&size(a)));
         }

@@ -1,5 +1,7 @@
 //! The one kernel that every column passes: a smooth bump, and differences of it as its derivatives.
 
+use std::ops::Range;
+
 /// Half the kernel's support, and the time between the rows that it leaves, s.
 const HALF_S: f64 = 0.026;
 const STEP_S: f64 = 0.010;
@@ -43,6 +45,11 @@ impl Kernel {
     /// Row of the log in the middle of a row that is left.
     pub(super) fn centre(&self, row: usize) -> usize {
         self.half + row * self.thinning
+    }
+
+    /// Rows of the log that rows which are left are made of.
+    pub(super) fn rows_of(&self, left: Range<usize>) -> Range<usize> {
+        left.start * self.thinning..(left.end - 1) * self.thinning + 2 * self.half + 1
     }
 
     /// A column (`order` 0) or its derivative of an order up to 2, thinned.

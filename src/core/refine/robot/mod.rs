@@ -25,6 +25,7 @@ mod trace;
 mod tried;
 mod twin;
 mod uncertainty;
+mod waves;
 
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
@@ -120,7 +121,7 @@ fn read(logs: &[Log]) -> Result<Vec<Readings>, RefineError> {
 pub(super) fn moments(robot: &RobotModel, log: &Log) -> Option<[Vec<Moment>; 2]> {
     let readings = Readings::new(log).filter(|readings| readings.rows() > 100)?.acting(robot);
     let kernel = kernel::Kernel::new(readings.dt_s);
-    Some(motion::Motion::new(&readings, robot, &kernel, None, 0.0).moments)
+    Some(motion::Motion::new(&readings, robot, &kernel, None).moments)
 }
 
 /// Finds what the model of a robot lacks. Without `held_out` logs the last third of each log is held out.
@@ -184,7 +185,7 @@ pub(super) fn refine(
         let left = search.left_raw(&search.picks, &fit.judged.coefficients);
         let loads = trace.loads(&found::laws(&search, &fit));
         channels = Channels::new(&trace, &left);
-        trace.refill(&loads, 0.0);
+        trace.refill(&loads);
     }
     Ok(Refinement::unfit(model, data_health))
 }

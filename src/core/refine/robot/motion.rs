@@ -5,6 +5,7 @@ use crate::effects::{Action, Moment};
 use crate::friction::Stribeck;
 use crate::model_file::RobotModel;
 use crate::record::Log;
+use crate::robot::{Accelerations, Coefficients};
 
 use super::kernel::Kernel;
 
@@ -179,6 +180,7 @@ pub(super) struct Motion {
     pub(super) residual: [Vec<f64>; 2],
     /// T of both motors at those rows, N m.
     pub(super) torque_nm: Vec<f64>,
+    pub(super) shafts: Shafts,
 }
 
 /// Value at each row between the knots of a line, whose places may be fractions of a row.
@@ -231,48 +233,63 @@ fn centred(column: &[f64]) -> Vec<f64> {
     first.into_iter().chain(pairs).collect()
 }
 
-impl Motion {
-    /// The motion of `robot`, with the loads of effects beside it, whose IMU speaks `imu_delay_s` later than
-    /// declared.
-    pub(super) fn new(
-        readings: &Readings,
-        robot: &RobotModel,
-        kernel: &Kernel,
-        loads: Option<&Loads>,
-        imu_delay_s: f64,
-    ) -> Self {
-        let (rows, dt) = (readings.rows(), readings.dt_s);
-        let p = &robot.parameters;
-        let radius = p.wheel_radius_m;
-        let imu_delay_s = imu_delay_s + robot.sensors.imu_latency_s;
-        let turned: Vec<f64> =
-            (0..rows).map(|i| 0.5 * (readings.angle_rad[0][i] + readings.angle_rad[1][i])).collect();
-        let speeds = [0, 1].map(|motor: usize| slope(&readings.angle_rad[motor], dt));
+/// What encoders and torques alone say, row by row.
+#[derive(Clone, Debug)]
+pub(super) struct Shafts {
+    /// Mean angle of the motors, rad.
+    turned: Vec<f64>,
+    /// Of the left and the right motor, rad/s.
+    speeds: [Vec<f64>; 2],
+    /// Friction of both motors, N m.
+    rubbing: Vec<f64>,
+    /// Torque of both motors from each row on, and at its own time, N m.
+    both: Vec<f64>,
+    torque: Vec<f64>,
+}
+
+impl Shafts {
+    fn new(readings: &Readings, robot: &RobotModel) -> Self {
+        let rows = readings.rows();
+        let sum = |columns: &[Vec<f64>; 2], row: usize| columns[0][row] + columns[1][row];
+        let turned = (0..rows).map(|row| 0.5 * sum(&readings.angle_rad, row)).collect();
+        let speeds = [0, 1].map(|motor: usize| slope(&readings.angle_rad[motor], readings.dt_s));
         let friction = |motor: usize, row: usize| {
             robot.friction[motor].map_or(0.0, |curve: Stribeck| curve.torque_nm(speeds[motor][row]))
         };
-        let rubbing: Vec<f64> = (0..rows).map(|row| friction(0, row) + friction(1, row)).collect();
-        let both: Vec<f64> = (0..rows).map(|i| readings.torque_nm[0][i] + readings.torque_nm[1][i]).collect();
-        let torque = centred(&both);
-        let extra =
-            |row: usize| loads.map_or((0.0, 0.0, 0.0), |l| (l.shafts_nm[row], l.axle_n[row], l.body_nm[row]));
-        let coefficients = p.coefficients();
-        let accelerations = |pitch: f64, rate: f64, torque: f64, row: usize| {
-            let (shafts, axle, body) = extra(row);
-            let shaft = torque - rubbing[row] + shafts;
-            coefficients.accelerations(
-                (libm::sin(pitch), libm::cos(pitch)),
-                rate,
-                shaft + radius * axle,
-                body - shaft,
-            )
-        };
+        let rubbing = (0..rows).map(|row| friction(0, row) + friction(1, row)).collect();
+        let both: Vec<f64> = (0..rows).map(|row| sum(&readings.torque_nm, row)).collect();
+        Self { turned, rubbing, torque: centred(&both), both, speeds }
+    }
+}
+
+/// The way of the robot through a log, row by row.
+struct Way<'a> {
+    readings: &'a Readings,
+    shafts: &'a Shafts,
+    robot: &'a RobotModel,
+    loads: Option<&'a Loads>,
+    pitch: Vec<f64>,
+    rate: Vec<f64>,
+}
+
+impl<'a> Way<'a> {
+    fn new(
+        readings: &'a Readings,
+        shafts: &'a Shafts,
+        robot: &'a RobotModel,
+        loads: Option<&'a Loads>,
+        imu_delay_s: f64,
+    ) -> Self {
+        let (rows, dt) = (readings.rows(), readings.dt_s);
+        let imu_delay_s = imu_delay_s + robot.sensors.imu_latency_s;
         let places: Vec<f64> =
             readings.fresh.iter().map(|&row| (row as f64 - imu_delay_s / dt).max(0.0)).collect();
         let said = |column: &[f64]| -> Vec<f64> { readings.fresh.iter().map(|&row| column[row]).collect() };
         let (said_pitch, said_rate) = (said(&readings.pitch_rad), said(&readings.rate_rad_s));
-        let mut pitch = line(rows, &places, &said_pitch);
-        let mut rate = line(rows, &places, &said_rate);
+        let pitch = line(rows, &places, &said_pitch);
+        let rate = line(rows, &places, &said_rate);
+        let mut way = Self { readings, shafts, robot, loads, pitch, rate };
+        let coefficients = robot.parameters.coefficients();
         // The model's motion between two readings, bent by a line so that it goes through both.
         let bent = |free: &[f64], said: &[f64]| -> Vec<f64> {
             let errors: Vec<f64> =
@@ -283,60 +300,56 @@ impl Motion {
             let (mut free_rate, mut sum) = (Vec::with_capacity(rows), 0.0);
             for row in 0..rows {
                 free_rate.push(sum);
-                sum += dt * accelerations(pitch[row], rate[row], both[row], row).pitch_accel_rad_s2;
+                let sincos = libm::sincos(way.pitch[row]);
+                let accel = way.accelerations(&coefficients, sincos, shafts.both[row], row);
+                sum += dt * accel.pitch_accel_rad_s2;
             }
-            rate = bent(&free_rate, &said_rate);
+            way.rate = bent(&free_rate, &said_rate);
             let (mut free_pitch, mut sum) = (Vec::with_capacity(rows), 0.0);
             for row in 0..rows {
                 free_pitch.push(sum);
-                let next = rate[(row + 1).min(rows - 1)];
-                sum += 0.5 * dt * (rate[row] + next);
+                let next = way.rate[(row + 1).min(rows - 1)];
+                sum += 0.5 * dt * (way.rate[row] + next);
             }
-            pitch = bent(&free_pitch, &said_pitch);
+            way.pitch = bent(&free_pitch, &said_pitch);
         }
-        let way: Vec<f64> = (0..rows).map(|i| radius * (turned[i] + pitch[i])).collect();
-        let start = (0..rows).map(|i| readings.x_m[i] - way[i]).sum::<f64>() / rows as f64;
-        let moments = [0, 1].map(|motor: usize| {
-            let own = centred(&readings.torque_nm[motor]);
-            let moment = |row: usize| {
-                let speed = speeds[motor][row];
-                let accel = accelerations(pitch[row], rate[row], torque[row], row);
-                Moment {
-                    time_s: readings.time_s[row],
-                    dt_s: dt,
-                    motor_angle_rad: readings.angle_rad[motor][row],
-                    motor_speed_rad_s: speed,
-                    motor_accel_rad_s2: accel.x_ddot_m_s2 / radius - accel.pitch_accel_rad_s2,
-                    torque_nm: own[row],
-                    torque_sum_nm: torque[row],
-                    x_m: way[row] + start,
-                    x_dot_m_s: radius * (0.5 * (speeds[0][row] + speeds[1][row]) + rate[row]),
-                    x_accel_m_s2: accel.x_ddot_m_s2,
-                    pitch_rad: pitch[row],
-                    pitch_rate_rad_s: rate[row],
-                    pitch_accel_rad_s2: accel.pitch_accel_rad_s2,
-                }
-            };
-            (0..rows).map(moment).collect::<Vec<_>>()
-        });
-        let asked = [0, 1].map(|motor: usize| {
-            let raw = |(row, moment): (usize, &Moment)| Moment {
-                torque_nm: readings.torque_nm[motor][row],
-                torque_sum_nm: both[row],
-                ..*moment
-            };
-            moments[motor].iter().enumerate().map(raw).collect::<Vec<_>>()
-        });
-        // r1 = d²/dt² [a x + M l sin θ] − S/r and r2 = (J + M l²) θ̈ + M l cos θ ẍ − M g l sin θ + S.
+        way
+    }
+
+    /// Of the model at a row, for a torque of both motors.
+    fn accelerations(
+        &self,
+        coefficients: &Coefficients,
+        sincos: (f64, f64),
+        torque_nm: f64,
+        row: usize,
+    ) -> Accelerations {
+        let load = |l: &Loads| (l.shafts_nm[row], l.axle_n[row], l.body_nm[row]);
+        let (shafts, axle, body) = self.loads.map_or((0.0, 0.0, 0.0), load);
+        let shaft = torque_nm - self.shafts.rubbing[row] + shafts;
+        let radius = self.robot.parameters.wheel_radius_m;
+        coefficients.accelerations(sincos, self.rate[row], shaft + radius * axle, body - shaft)
+    }
+
+    /// sin and cos of the pitch.
+    fn sincos(&self) -> [Vec<f64>; 2] {
+        let (sin, cos) = self.pitch.iter().map(|&pitch| libm::sincos(pitch)).unzip();
+        [sin, cos]
+    }
+
+    /// r1 and r2: r1 = d²/dt² [a x + M l sin θ] − S/r and r2 = (J + M l²) θ̈ + M l cos θ ẍ − M g l sin θ + S.
+    fn residual(&self, kernel: &Kernel, [sin, cos]: &[Vec<f64>; 2]) -> [Vec<f64>; 2] {
+        let rows = self.readings.rows();
+        let p = &self.robot.parameters;
+        let (coefficients, radius) = (p.coefficients(), p.wheel_radius_m);
         let lever = p.body_mass_kg * p.com_height_m;
-        let cos: Vec<f64> = pitch.iter().map(|&pitch| libm::cos(pitch)).collect();
-        let sin: Vec<f64> = pitch.iter().map(|&pitch| libm::sin(pitch)).collect();
-        let shaft: Vec<f64> = (0..rows).map(|row| torque[row] - rubbing[row]).collect();
-        let swing: Vec<f64> = (0..rows).map(|row| cos[row] * rate[row]).collect();
-        let turning = kernel.apply(&rate, 1);
-        let rolling = kernel.apply(&turned, 2);
+        let shaft: Vec<f64> =
+            (0..rows).map(|row| self.shafts.torque[row] - self.shafts.rubbing[row]).collect();
+        let swing: Vec<f64> = (0..rows).map(|row| cos[row] * self.rate[row]).collect();
+        let turning = kernel.apply(&self.rate, 1);
+        let rolling = kernel.apply(&self.shafts.turned, 2);
         let (swing, shaft) = (kernel.apply(&swing, 1), kernel.apply(&shaft, 0));
-        let (cos, sin) = (kernel.apply(&cos, 0), kernel.apply(&sin, 0));
+        let (cos, sin) = (kernel.apply(cos, 0), kernel.apply(sin, 0));
         let x_accel: Vec<f64> = rolling.iter().zip(&turning).map(|(q, turn)| radius * (q + turn)).collect();
         let mass = coefficients.c1 / radius;
         let translation =
@@ -347,9 +360,87 @@ impl Motion {
                     + shaft[i]
             })
             .collect();
-        let torque_nm = kernel.apply(&torque, 0);
-        Self { moments, asked, residual: [translation, pitching], torque_nm }
+        [translation, pitching]
     }
+
+    /// Every row of the left and the right motor, with torques at the time of the row.
+    fn moments(&self, [sin, cos]: &[Vec<f64>; 2]) -> [Vec<Moment>; 2] {
+        let (rows, dt_s) = (self.readings.rows(), self.readings.dt_s);
+        let p = &self.robot.parameters;
+        let (coefficients, radius) = (p.coefficients(), p.wheel_radius_m);
+        let way: Vec<f64> = (0..rows).map(|i| radius * (self.shafts.turned[i] + self.pitch[i])).collect();
+        let start = (0..rows).map(|i| self.readings.x_m[i] - way[i]).sum::<f64>() / rows as f64;
+        let torque_nm = self.readings.torque_nm.each_ref().map(|torque| centred(torque));
+        let mut moments = [0, 1].map(|_| Vec::with_capacity(rows));
+        for row in 0..rows {
+            let accel = self.accelerations(&coefficients, (sin[row], cos[row]), self.shafts.torque[row], row);
+            for (motor, moments) in moments.iter_mut().enumerate() {
+                moments.push(Moment {
+                    time_s: self.readings.time_s[row],
+                    dt_s,
+                    motor_angle_rad: self.readings.angle_rad[motor][row],
+                    motor_speed_rad_s: self.shafts.speeds[motor][row],
+                    motor_accel_rad_s2: accel.x_ddot_m_s2 / radius - accel.pitch_accel_rad_s2,
+                    torque_nm: torque_nm[motor][row],
+                    torque_sum_nm: self.shafts.torque[row],
+                    x_m: way[row] + start,
+                    x_dot_m_s: radius
+                        * (0.5 * (self.shafts.speeds[0][row] + self.shafts.speeds[1][row]) + self.rate[row]),
+                    x_accel_m_s2: accel.x_ddot_m_s2,
+                    pitch_rad: self.pitch[row],
+                    pitch_rate_rad_s: self.rate[row],
+                    pitch_accel_rad_s2: accel.pitch_accel_rad_s2,
+                });
+            }
+        }
+        moments
+    }
+
+    /// The same with torques as asked from each row on.
+    fn asked(&self, moments: &[Vec<Moment>; 2]) -> [Vec<Moment>; 2] {
+        [0, 1].map(|motor: usize| {
+            let raw = |(row, moment): (usize, &Moment)| Moment {
+                torque_nm: self.readings.torque_nm[motor][row],
+                torque_sum_nm: self.shafts.both[row],
+                ..*moment
+            };
+            moments[motor].iter().enumerate().map(raw).collect()
+        })
+    }
+}
+
+impl Motion {
+    /// The motion of `robot`, with the loads of effects beside it.
+    pub(super) fn new(
+        readings: &Readings,
+        robot: &RobotModel,
+        kernel: &Kernel,
+        loads: Option<&Loads>,
+    ) -> Self {
+        let shafts = Shafts::new(readings, robot);
+        let way = Way::new(readings, &shafts, robot, loads, 0.0);
+        let sincos = way.sincos();
+        let moments = way.moments(&sincos);
+        Self {
+            asked: way.asked(&moments),
+            residual: way.residual(kernel, &sincos),
+            torque_nm: kernel.apply(&shafts.torque, 0),
+            moments,
+            shafts,
+        }
+    }
+}
+
+/// r1 and r2 of a robot whose IMU speaks `imu_delay_s` later than declared.
+pub(super) fn late_residual(
+    readings: &Readings,
+    shafts: &Shafts,
+    robot: &RobotModel,
+    kernel: &Kernel,
+    imu_delay_s: f64,
+) -> [Vec<f64>; 2] {
+    let way = Way::new(readings, shafts, robot, None, imu_delay_s);
+    way.residual(kernel, &way.sincos())
 }
 
 /// r1 and r2 of a motor's action.

@@ -8,7 +8,8 @@ use crate::model_file::RobotModel;
 use crate::robot::Motor;
 
 use super::kernel::Kernel;
-use super::motion::{Loads, Motion, Readings, of_action};
+use super::motion::{Loads, Motion, Readings, late_residual, of_action};
+use super::waves;
 
 /// What a row is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -76,7 +77,7 @@ impl<'a> Trace<'a> {
             training.into_iter().map(|log| (log, true)).chain(held_out.into_iter().map(|log| (log, false)));
         let pieces = logs
             .map(|(readings, fit)| {
-                let motion = Motion::new(&readings, robot, &kernel, None, 0.0);
+                let motion = Motion::new(&readings, robot, &kernel, None);
                 Piece { parts: parts(&readings, fit), readings, motion, plain: OnceLock::new() }
             })
             .collect();
@@ -121,7 +122,7 @@ impl<'a> Trace<'a> {
     pub(super) fn of_training(robot: &'a RobotModel, logs: Vec<Readings>) -> Self {
         let kernel = Kernel::new(logs.first().map_or(1e-3, |readings| readings.dt_s));
         let piece = |readings: Readings| {
-            let motion = Motion::new(&readings, robot, &kernel, None, 0.0);
+            let motion = Motion::new(&readings, robot, &kernel, None);
             let parts = vec![Part::Fit; kernel.count(readings.rows())];
             Piece { parts, readings, motion, plain: OnceLock::new() }
         };
@@ -187,9 +188,9 @@ impl<'a> Trace<'a> {
     }
 
     /// The motion anew, with what effects add to it.
-    pub(super) fn refill(&mut self, loads: &[Loads], imu_delay_s: f64) {
+    pub(super) fn refill(&mut self, loads: &[Loads]) {
         for (piece, loads) in self.pieces.iter_mut().zip(loads) {
-            piece.motion = Motion::new(&piece.readings, self.robot, &self.kernel, Some(loads), imu_delay_s);
+            piece.motion = Motion::new(&piece.readings, self.robot, &self.kernel, Some(loads));
         }
         self.take_off_known();
     }
@@ -249,6 +250,21 @@ impl<'a> Trace<'a> {
         }
     }
 
+    /// Unit columns of cos and sin of the orders `first`, `first` + 1, … of the motors' angle.
+    pub(super) fn waves(
+        &self,
+        action: fn(f64, &Moment) -> Action,
+        first: f64,
+        count: usize,
+    ) -> Vec<[Pair; 2]> {
+        let mut found = vec![<[Pair; 2]>::default(); count];
+        for piece in &self.pieces {
+            let chain = (&self.kernel, self.machine.parameters.wheel_radius_m);
+            waves::extend(&mut found, first, action, &piece.motion.moments, chain);
+        }
+        found
+    }
+
     /// Torque that a part of the body on a spring adds, per inertia of the part.
     fn driven(&self, shape: &[f64]) -> Pair {
         let (omega, damping) = (TAU * shape[0], shape[1]);
@@ -268,8 +284,9 @@ impl<'a> Trace<'a> {
     fn late(&self, delay_s: f64) -> Pair {
         let mut found = [Vec::new(), Vec::new()];
         for piece in &self.pieces {
-            let residual =
-                |delay_s: f64| Motion::new(&piece.readings, self.robot, &self.kernel, None, delay_s).residual;
+            let residual = |delay_s: f64| {
+                late_residual(&piece.readings, &piece.motion.shafts, self.robot, &self.kernel, delay_s)
+            };
             let (now, late) = (piece.plain.get_or_init(|| residual(0.0)), residual(delay_s));
             for (equation, found) in found.iter_mut().enumerate() {
                 let pairs = now[equation].iter().zip(&late[equation]);

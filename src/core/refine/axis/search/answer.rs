@@ -18,8 +18,8 @@ impl Search<'_> {
         let own = &self.picks[pick];
         let mut others: Vec<Candidate> =
             self.library.iter().filter(|other| other.kind != own.kind).cloned().collect();
-        if own.kind.series {
-            let alike = KINDS.into_iter().filter(|kind| kind.series && *kind != own.kind);
+        if own.kind.series() {
+            let alike = KINDS.into_iter().filter(|kind| kind.series() && *kind != own.kind);
             let on = alike.filter(|kind| kind.is_on(self.machine.kind));
             others.extend(on.map(|kind| self.candidate(kind, own.shape.clone())));
         }

@@ -26,7 +26,7 @@ impl Search<'_> {
         let kind = self.picks[pick].kind;
         let Some(mut best) = self.left_with(pick, &self.picks[pick]) else { return false };
         for (index, parameter) in kind.shapes().enumerate() {
-            let linear_wave = kind.series && self.machine.kind == MachineKind::Linear;
+            let linear_wave = kind.series() && self.machine.kind == MachineKind::Linear;
             if parameter.whole && !linear_wave {
                 continue;
             }
@@ -74,7 +74,7 @@ impl Search<'_> {
         for &index in picks {
             let (pick, first) = places[index];
             for (n, parameter) in pick.kind.shapes().enumerate() {
-                let linear_wave = pick.kind.series && self.machine.kind == MachineKind::Linear;
+                let linear_wave = pick.kind.series() && self.machine.kind == MachineKind::Linear;
                 if parameter.whole && !linear_wave {
                     errors.push(None);
                     continue;

@@ -292,7 +292,7 @@ impl Search<'_> {
     fn has(&self, candidate: &Candidate) -> bool {
         self.picks
             .iter()
-            .any(|pick| pick.kind == candidate.kind && (!pick.kind.series || pick.shape == candidate.shape))
+            .any(|pick| pick.kind == candidate.kind && (!pick.kind.series() || pick.shape == candidate.shape))
     }
 
     /// A pick whose size is no longer certain beside the others.
