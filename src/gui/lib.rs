@@ -27,6 +27,7 @@ mod job;
 mod layout;
 mod live;
 mod load;
+mod memory;
 mod messages;
 mod panes;
 mod picture;
@@ -50,6 +51,6 @@ mod write_file;
 
 pub use app::App;
 pub use document::default_folder as default_state_folder;
-pub use frames::keep_freed_memory;
+pub use memory::keep_freed_memory;
 pub use tab::Tab;
 pub use window::{WindowError, WindowOptions, run};

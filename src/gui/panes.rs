@@ -7,6 +7,9 @@ use egui::{CentralPanel, Frame, Id, Margin, Panel, ScrollArea, Ui};
 /// Space at the left and right of a pane's content, in points.
 pub(crate) const MARGIN: f32 = 10.0;
 
+/// What fills what the others leave is at least this high: a lower page scrolls.
+const LEAST_HEIGHT: f32 = 420.0;
+
 /// One pane; `key` is what the page calls it.
 pub(crate) struct Pane<K> {
     key: K,
@@ -100,7 +103,15 @@ pub(crate) fn panes_ui<K: Copy>(
         );
     }
     CentralPanel::default().frame(central).show(ui, |ui| match panes.get(filling) {
-        Some(Pane { key, place: Place::Middle, .. }) => show(*key, ui),
+        Some(Pane { key, place: Place::Middle, .. }) if ui.available_height() >= LEAST_HEIGHT => {
+            show(*key, ui)
+        }
+        Some(Pane { key, place: Place::Middle, .. }) => {
+            ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+                let size = egui::vec2(ui.available_width(), LEAST_HEIGHT);
+                ui.allocate_ui(size, |ui| show(*key, ui));
+            });
+        }
         Some(pane) => {
             ScrollArea::vertical().auto_shrink(false).show(ui, |ui| show(pane.key, ui));
         }

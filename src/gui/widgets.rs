@@ -1,6 +1,6 @@
 //! Small pieces that every tab uses: section heads, messages, number fields, number text.
 
-use egui::{DragValue, Response, RichText, Ui, WidgetText};
+use egui::{Color32, DragValue, Response, RichText, Ui, WidgetText, vec2};
 
 use crate::theme::palette;
 
@@ -11,6 +11,13 @@ pub(crate) fn section_ui(ui: &mut Ui, title: &str, controls: impl FnOnce(&mut Ui
         ui.label(RichText::new(title).heading().strong());
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), controls);
     });
+}
+
+/// Name and colour of a curve, for the head of a section.
+pub(crate) fn legend_ui(ui: &mut Ui, name: &str, color: Color32) {
+    ui.label(RichText::new(name).small().strong().color(color));
+    let (rect, _) = ui.allocate_exact_size(vec2(16.0, 12.0), egui::Sense::hover());
+    ui.painter().hline(rect.x_range(), rect.center().y, egui::Stroke::new(2.5, color));
 }
 
 /// A quiet explanation.

@@ -8,7 +8,7 @@ use flqr_core::model_file::Model;
 use flqr_core::record::Mapping;
 
 use crate::app::App;
-use crate::frames::keep_freed_memory;
+use crate::memory::keep_freed_memory;
 use crate::robot::{Devices, System};
 use crate::tab::Tab;
 
@@ -143,7 +143,7 @@ fn open(options: WindowOptions, opening: &std::sync::atomic::AtomicBool) -> efra
         .with_title("flqr")
         .with_app_id("flqr")
         .with_inner_size([1240.0, 720.0])
-        .with_min_inner_size([1000.0, 640.0])
+        .with_min_inner_size([480.0, 320.0])
         .with_drag_and_drop(true);
     if let Ok(icon) = eframe::icon_data::from_png_bytes(ICON) {
         viewport = viewport.with_icon(icon);

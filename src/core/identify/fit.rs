@@ -194,6 +194,7 @@ fn motion_report(
         rmse_unit: found.rmse_unit,
         relative_error: found.relative_error,
         pairs: Vec::new(),
+        series: Some(found.series),
         iterations: 0,
         history: Vec::new(),
         data_health: Vec::new(),

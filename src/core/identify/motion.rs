@@ -154,6 +154,21 @@ pub struct MotionParameter {
     pub held: bool,
 }
 
+/// What a fit from motion was made to agree with, row by row, log after log: to see where it does not.
+///
+/// All of it has passed the filters of the fit; rows near a rest are left out, as they were of the fit.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MotionSeries {
+    /// Time in the log, s; where it runs back, the next log begins.
+    pub time_s: Vec<f64>,
+    /// Speed, rad/s or m/s.
+    pub speed: Vec<f64>,
+    /// Measured torque or force, N m or N.
+    pub measured: Vec<f64>,
+    /// The same as the fitted model has it; `rmse` is that of the differences.
+    pub fitted: Vec<f64>,
+}
+
 /// Result of [`fit_motion`].
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MotionFit {
@@ -167,6 +182,8 @@ pub struct MotionFit {
     pub relative_error: f64,
     /// Rows of the regression.
     pub rows: usize,
+    /// The rows themselves.
+    pub series: MotionSeries,
     /// Cut-off of the position filter for each log, Hz.
     pub cutoff_hz: Vec<f64>,
     /// Condition number of the scaled columns: near 1 independent, above 100 hard to tell apart.

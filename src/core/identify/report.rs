@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::FrictionPair;
+use super::motion::MotionSeries;
 use super::parameters::KEYS;
 use crate::friction::StribeckParameters;
 use crate::record::HealthFinding;
@@ -43,6 +44,8 @@ pub struct FitReport {
     pub relative_error: f64,
     /// The pairs of section 3.1; empty for fits from motion.
     pub pairs: Vec<FrictionPair>,
+    /// Measured against fitted; none of a fit of pairs.
+    pub series: Option<MotionSeries>,
     /// Iterations of the swarm; 0 for fits from motion, which have none.
     pub iterations: usize,
     /// Best error after each of the `iterations`, unit as `rmse`.

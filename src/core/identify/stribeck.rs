@@ -76,6 +76,7 @@ pub fn fit_pairs(
         rmse_unit: "N m",
         relative_error: (fit.sum / torque_square).sqrt(),
         pairs: pairs.to_vec(),
+        series: None,
         iterations: history.len(),
         history,
         data_health: Vec::new(),

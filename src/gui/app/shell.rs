@@ -14,6 +14,11 @@ use crate::tab::Tab;
 use crate::theme::palette;
 use crate::widgets::choice_ui;
 
+/// Widths of the window from which on the names of all sources, further buttons and the names of all pages have room.
+const ROOM_FOR_SOURCES: f32 = 1020.0;
+const ROOM_FOR_BUTTONS: f32 = 780.0;
+const ROOM_FOR_TABS: f32 = 600.0;
+
 impl App {
     pub(super) fn shell_ui(&mut self, ui: &mut Ui) {
         self.shortcuts(ui);
@@ -64,23 +69,47 @@ impl App {
     }
 
     fn head_ui(&mut self, ui: &mut Ui) {
+        let room = ui.available_width();
         ui.horizontal(|ui| {
             menu_ui(&self.situation(ui.ctx()), &self.commands, ui);
             ui.scope(|ui| {
                 ui.spacing_mut().button_padding.x = 10.0;
                 ui.spacing_mut().item_spacing.x = 2.0;
-                Tab::ALL.into_iter().for_each(|tab| self.tab_ui(tab, ui));
+                if room < ROOM_FOR_TABS {
+                    self.tab_menu_ui(ui);
+                } else {
+                    Tab::ALL.into_iter().for_each(|tab| self.tab_ui(tab, ui));
+                }
             });
             ui.separator();
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                ui.menu_button("Keys", keys_ui);
-                self.theme_ui(ui);
-                ui.separator();
-                self.source_ui(ui);
+                // The menu has both.
+                if room >= ROOM_FOR_BUTTONS {
+                    ui.menu_button("Keys", keys_ui);
+                    self.theme_ui(ui);
+                    ui.separator();
+                }
+                if room < ROOM_FOR_SOURCES {
+                    self.source_menu_ui(ui);
+                } else {
+                    self.source_ui(ui);
+                }
                 ui.separator();
                 let name = egui::Layout::left_to_right(egui::Align::Center);
                 ui.with_layout(name, |ui| self.model_name_ui(ui));
             });
+        });
+    }
+
+    /// The pages in one button, where there is no room for all of their names.
+    fn tab_menu_ui(&self, ui: &mut Ui) {
+        ui.menu_button(self.tab.title(), |ui| {
+            for tab in Tab::ALL {
+                if ui.selectable_label(tab == self.tab, tab.title()).on_hover_text(tab.help()).clicked() {
+                    self.commands.send(Command::SelectTab(tab));
+                    ui.close();
+                }
+            }
         });
     }
 
@@ -139,6 +168,18 @@ impl App {
             }
         });
         ui.label("Source");
+    }
+
+    /// The sources in one button.
+    fn source_menu_ui(&self, ui: &mut Ui) {
+        ui.menu_button(self.source.name(), |ui| {
+            for (source, name, help) in Source::ALL {
+                if ui.selectable_label(source == self.source, name).on_hover_text(help).clicked() {
+                    self.commands.send(Command::SelectSource(source));
+                    ui.close();
+                }
+            }
+        });
     }
 
     fn status_ui(&self, ui: &mut Ui) {

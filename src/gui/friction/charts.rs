@@ -17,13 +17,8 @@ const POINTS_PER_SIDE: usize = 300;
 
 pub(super) fn ui(context: &ViewContext<'_>, fit: &FitRun, kind: Option<LogKind>, ui: &mut Ui) {
     section_ui(ui, "Fitted", |_| {});
-    let from_motion = fit.report.as_ref().is_some_and(|report| report.pairs.is_empty());
-    if from_motion {
-        hint_ui(ui, "A fit from motion has no pairs of speed and torque to show; its parameters are beside.");
-        return;
-    }
     if fit.report.is_none() && kind == Some(LogKind::LinearAxis) {
-        hint_ui(ui, "A linear axis is fitted from its motion: start the fit, its parameters appear beside.");
+        hint_ui(ui, "A linear axis is fitted from its motion: start the fit to see how well it agrees.");
         return;
     }
     let height = ui.available_height();
@@ -34,11 +29,12 @@ pub(super) fn ui(context: &ViewContext<'_>, fit: &FitRun, kind: Option<LogKind>,
     });
 }
 
-fn chart<'a>(ui: &Ui, size: egui::Vec2, x_label: &'a str, y_label: &'a str) -> Plot<'a> {
+/// A chart with the look of this page.
+pub(super) fn chart<'a>(ui: &Ui, size: egui::Vec2, x_label: &'a str, y_label: &'a str) -> Plot<'a> {
     let plot =
         Plot::new(("chart", x_label)).width(size.x.max(1.0)).height(size.y.max(1.0)).allow_scroll(false);
-    Axes { x_label: Some(x_label), y_label, x_lines: 0.016 * f64::from(size.x), y_lines: 5.0 }
-        .on(plot, ui.visuals())
+    let x_lines = 0.016 * f64::from(size.x);
+    Axes { x_label: Some(x_label), y_label, height: size.y, x_lines, y_lines: 5.0 }.on(plot, ui.visuals())
 }
 
 fn curve_plot(context: &ViewContext<'_>, fit: &FitRun, ui: &mut Ui, size: egui::Vec2) {

@@ -10,6 +10,7 @@ use flqr_core::model_file::{AxisParameters, Model, Rig};
 use flqr_core::record::{Log, LogKind, Mapping};
 
 use super::fitted::Fitted;
+use super::motion_chart::MotionChart;
 use crate::command::Command;
 use crate::context::ViewContext;
 use crate::job::{Job, Outcome, Waker};
@@ -45,6 +46,8 @@ pub(super) struct FitRun {
     pub(super) convergence: Vec<[f64; 2]>,
     last_step: Option<Step>,
     pub(super) report: Option<FitReport>,
+    /// How a fit from motion agrees with the log.
+    pub(super) motion: Option<MotionChart>,
     made_with: Option<MadeWith>,
     /// The row of a fit that has ended, until the ledger takes it.
     pub(super) finished: Option<Run>,
@@ -67,6 +70,7 @@ impl Default for FitRun {
             convergence: Vec::new(),
             last_step: None,
             report: None,
+            motion: None,
             made_with: None,
             finished: None,
             row: None,
@@ -188,6 +192,7 @@ impl FitRun {
         self.convergence.clear();
         self.last_step = None;
         self.report = None;
+        self.motion = None;
         self.row = None;
         self.problem = None;
     }
@@ -209,6 +214,7 @@ impl FitRun {
                     format!("The fit ended with an error of {:.3e} {}.", report.rmse, report.rmse_unit);
                 self.show_history(&report);
                 self.finished = self.made_with.take().map(|made_with| made_with.row(&report, sources));
+                self.motion = MotionChart::new(&report);
                 self.report = Some(report);
                 text
             }

@@ -3,6 +3,7 @@
 mod charts;
 mod fit;
 mod fitted;
+mod motion_chart;
 mod preview;
 mod result;
 mod source;
@@ -166,6 +167,11 @@ impl FrictionTab {
             let row = self.fit.row.as_ref().filter(|_| self.fit.report.is_some());
             self.preview.ui(context, &self.loader, row, ui);
         });
+        let row = self.fit.row.clone();
+        if let Some(chart) = &mut self.fit.motion {
+            let sources = self.loader.log().map(|loaded| preview::sources(loaded, row.as_ref()));
+            return chart.ui(context, sources.unwrap_or_default(), ui);
+        }
         let kind = self.loader.log().and_then(|loaded| loaded.kind.as_ref().ok().copied());
         charts::ui(context, &self.fit, kind, ui);
     }

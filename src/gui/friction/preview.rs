@@ -127,7 +127,7 @@ impl Preview {
 }
 
 /// Where the curve comes from, for exports: the log, and what was made of it.
-fn sources(loaded: &LoadedLog, row: Option<&Run>) -> Vec<String> {
+pub(super) fn sources(loaded: &LoadedLog, row: Option<&Run>) -> Vec<String> {
     let log = format!("log {}, sources {}", loaded.path.display(), loaded.sources.hex());
     std::iter::once(log).chain(row.map(Run::provenance)).collect()
 }

@@ -58,16 +58,25 @@ impl Node {
         let Some(rest) = self.without(&mut seen) else { return self.clone() };
         let alone = Self::Tabs { tabs: vec![tab], active: Some(tab) };
         match side {
-            Side::Right | Side::Below => Self::Split {
-                below: side == Side::Below,
-                shares: vec![1.0, 1.0],
-                children: vec![rest, alone],
-            },
+            Side::Right | Side::Below => rest.beside(alone, side == Side::Below),
             Side::Back => {
                 let mut rest = rest;
                 rest.first_tabs().insert(0, tab);
                 rest.in_order()
             }
+        }
+    }
+
+    /// With another part at its end: among several in a row all of them keep their proportions, and the new one gets
+    /// as much as they have on average.
+    fn beside(self, other: Self, other_below: bool) -> Self {
+        match self {
+            Self::Split { below, mut shares, mut children } if below == other_below => {
+                shares.push(shares.iter().sum::<f32>() / shares.len() as f32);
+                children.push(other);
+                Self::Split { below, shares, children }
+            }
+            one => Self::Split { below: other_below, shares: vec![1.0, 1.0], children: vec![one, other] },
         }
     }
 
@@ -221,6 +230,17 @@ mod tests {
         assert_eq!(tabs_of(&children[1]), [Tab::Friction]);
         let back = below.moved(Tab::Friction, Side::Back).moved(Tab::Robot, Side::Back);
         assert!(back.is_alike(&usual), "{back:?}");
+    }
+
+    #[test]
+    fn a_third_page_in_a_row_is_as_wide_as_the_others() {
+        let two = Node::default().moved(Tab::Robot, Side::Right);
+        let three = two.moved(Tab::Runs, Side::Right);
+        has_every_page_once(&three);
+        let Node::Split { below: false, shares, children } = &three else { panic!("{three:?}") };
+        assert_eq!((shares.as_slice(), tabs_of(&children[2])), ([1.0; 3].as_slice(), vec![Tab::Runs]));
+        let Node::Split { below: true, shares, .. } = three.moved(Tab::Log, Side::Below) else { panic!() };
+        assert_eq!(shares, [1.0; 2], "another direction");
     }
 
     #[test]

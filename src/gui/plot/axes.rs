@@ -6,11 +6,16 @@ use egui_plot::{AxisHints, GridInput, GridMark, HPlacement, Plot};
 /// Width kept for a vertical axis, so that stacked plots line up.
 pub(crate) const Y_AXIS_WIDTH: f32 = 64.0;
 
+/// Height of the horizontal axis with its label.
+pub(crate) const X_AXIS_HEIGHT: f32 = 36.0;
+
 /// Labels of both axes and how many grid lines each has, about.
 pub(crate) struct Axes<'a> {
     /// Without one the horizontal axis is not drawn: the plot below has it.
     pub(crate) x_label: Option<&'a str>,
     pub(crate) y_label: &'a str,
+    /// Height of the plot with its horizontal axis, in points: where it is too low for the label, the unit is left of it.
+    pub(crate) height: f32,
     pub(crate) x_lines: f64,
     pub(crate) y_lines: f64,
 }
@@ -90,7 +95,9 @@ impl<'a> Axes<'a> {
         };
         let (x_lines, y_lines, logarithmic) = (self.x_lines, self.y_lines, extras.logarithmic);
         let x = hints(AxisHints::new_x(), self.x_label.unwrap_or_default(), Rangef::new(24.0, 30.0));
-        let y = hints(AxisHints::new_y(), self.y_label, Rangef::new(12.0, 16.0))
+        let below = if self.x_label.is_some() { X_AXIS_HEIGHT } else { 0.0 };
+        let y_label = fitting(self.y_label, self.height - below);
+        let y = hints(AxisHints::new_y(), y_label, Rangef::new(12.0, 16.0))
             .placement(HPlacement::Left)
             .min_thickness(Y_AXIS_WIDTH);
         let y = if logarithmic { y.formatter(|mark, _| power_of_ten(mark.value)) } else { y };
@@ -110,6 +117,14 @@ impl<'a> Axes<'a> {
             })
             .grid_color(grid_color(visuals))
     }
+}
+
+/// As much of a label as fits along an axis: all of it, the unit, or nothing.
+fn fitting(label: &str, length: f32) -> &str {
+    const LETTER_WIDTH: f32 = 6.2;
+    let fits = |text: &&str| LETTER_WIDTH * text.chars().count() as f32 <= length;
+    let unit = label.rfind('[').map_or("", |at| &label[at..]);
+    [label, unit].into_iter().find(fits).unwrap_or_default()
 }
 
 fn right_axis<'p>(right: &Right) -> Option<AxisHints<'p>> {
@@ -195,6 +210,20 @@ fn tick(value: f64, step: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_low_plot_keeps_the_unit_of_its_label() {
+        for (label, length, left) in [
+            ("velocity [m/s]", 100.0, "velocity [m/s]"),
+            ("velocity [m/s]", 50.0, "[m/s]"),
+            ("velocity [m/s]", 10.0, ""),
+            ("order", 10.0, ""),
+            ("pitch [°]", 60.0, "pitch [°]"),
+            ("", 0.0, ""),
+        ] {
+            assert_eq!(fitting(label, length), left, "{label} on {length}");
+        }
+    }
 
     #[test]
     fn grid_marks_are_round_and_inside() {

@@ -1,9 +1,11 @@
 //! Plots over a shared horizontal range: decimated, following or held, with exact statistics.
 
 mod axes;
+mod bins;
 mod column;
 mod cursors;
 mod decimate;
+mod end_to_end;
 mod export;
 mod figure;
 mod kept;
@@ -20,8 +22,10 @@ mod unit;
 mod view;
 
 pub(crate) use axes::{Axes, Y_AXIS_WIDTH};
+pub(crate) use bins::{Band, Bin, binned};
 pub use column::{CHUNK, TimeColumn, ValueColumn};
 pub use decimate::{Curve, Data, DecimationCache, RangeStatistics, Visible, decimate};
+pub(crate) use end_to_end::one_after_another;
 pub use export::{FigureFile, FigureKind};
 pub use marks::{Marks, Moved};
 pub use stack::{Panel, PanelCurve, Stack, Wishes};

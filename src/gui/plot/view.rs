@@ -100,6 +100,7 @@ impl TimePlot<'_> {
         let axes = Axes {
             x_label: self.x_label,
             y_label: self.label,
+            height: self.height,
             x_lines: (f64::from(width) / 60.0).clamp(2.0, 8.0),
             y_lines: self.y_lines(),
         };

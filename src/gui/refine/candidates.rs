@@ -77,7 +77,7 @@ fn row_ui(index: usize, tried: &Tried, ui: &mut Ui) {
         place_text(kind.place),
         kind.separated_by
     ));
-    ui.add(egui::Label::new(RichText::new(&tried.detail).small()).extend());
+    ui.add(egui::Label::new(RichText::new(tried.detail.replace('-', "−")).small()).extend());
     ui.horizontal(|ui| {
         let share = (tried.gain_percent / 100.0).clamp(0.0, 1.0) as f32;
         let (rect, _) = ui.allocate_exact_size(vec2(BAR, 10.0), Sense::hover());
@@ -87,7 +87,8 @@ fn row_ui(index: usize, tried: &Tried, ui: &mut Ui) {
         ui.painter().rect_filled(bar, 2.0, if added { colors.accent } else { colors.reference });
         ui.label(mono(format!("{} %", shown(tried.gain_percent, 3))));
     });
-    ui.label(mono(shown(tried.z, 3)));
+    // A shape without a standard error, as a limit is, has none.
+    ui.label(mono(shown(if tried.z.is_finite() { tried.z } else { f64::NAN }, 3)));
     let color = match tried.fate {
         Fate::Added => colors.good,
         Fate::NotToldFrom(_) => colors.warning,

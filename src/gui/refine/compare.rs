@@ -4,7 +4,7 @@ use egui::{Grid, RichText, Ui};
 use flqr_core::refine::{Channels, ClosedLoop, Errors, LoopRun, Prediction, Quantity, Refinement, Residual};
 
 use super::strip::{StepState, Tone};
-use crate::widgets::{hint_ui, mono, section_ui, shown};
+use crate::widgets::{hint_ui, mono, plain, section_ui, shown};
 
 /// One row: what is measured, before, after, unit.
 struct Row {
@@ -50,13 +50,13 @@ fn rows(first: &Errors, second: Option<&Errors>) -> Vec<Row> {
         of(first).0.iter().enumerate().map(row).collect()
     };
     let mut rows = channels("residual", |errors| &errors.rmse);
-    rows.extend(channels("noise of the sensors alone", |errors| &errors.noise_floor));
+    rows.extend(channels("noise floor of the residual", |errors| &errors.noise_floor));
     rows.extend(channels("residual by the torque or force", |errors| &errors.nrmse));
     for (index, prediction) in first.prediction.iter().enumerate() {
         let shown_of = |own: &Prediction| own.told.then_some(own.rmse.value);
         let after = second.and_then(|second| second.prediction.get(index)).and_then(shown_of);
         rows.push(Row {
-            name: format!("{} after {} ms", prediction.variable, shown(1e3 * prediction.horizon_s, 3)),
+            name: format!("{} after {} ms", prediction.variable, plain(1e3 * prediction.horizon_s, 3)),
             values: [shown_of(prediction), after],
             unit: prediction.rmse.unit,
         });

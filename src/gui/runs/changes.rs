@@ -1,37 +1,49 @@
 //! What changed from one row to another.
 
-use egui::{ComboBox, Grid, RichText, ScrollArea, Ui};
+use std::collections::BTreeSet;
+
+use egui::{ComboBox, Grid, Label, RichText, ScrollArea, Ui};
 
 use super::run::{Ledger, Run, Value, differences};
 use crate::widgets::{change, hint_ui, mono, section_ui, shown};
 
-/// The two rows; the last two until others are chosen.
+/// Greatest width of a name and of a text among the values; a tip has all of it.
+const KEY_WIDTH: f32 = 170.0;
+const TEXT_WIDTH: f32 = 90.0;
+
+/// The two rows; until others are chosen those that are ticked, or the last two.
 #[derive(Default)]
 pub(super) struct Changes {
     chosen: [Option<u64>; 2],
 }
 
 impl Changes {
-    pub(super) fn ui(&mut self, ledger: &Ledger, ui: &mut Ui) {
+    pub(super) fn ui(&mut self, ledger: &Ledger, ticked: &BTreeSet<u64>, ui: &mut Ui) {
         section_ui(ui, "What changed", |_| {});
-        let rows = ledger.rows();
+        let usual = usual(ledger, ticked);
+        let mut numbers = usual;
         for (place, chosen) in self.chosen.iter_mut().enumerate() {
             chosen.take_if(|number| ledger.row(*number).is_none());
-            let usual = rows.len().checked_sub(2 - place).map(|index| rows[index].number);
-            let number = chosen.or(usual);
-            if let Some(other) = choice_ui(ui, ledger, ["from", "to"][place], number) {
+            if let Some(other) = choice_ui(ui, ledger, ["from", "to"][place], chosen.or(usual[place])) {
                 *chosen = Some(other);
             }
+            numbers[place] = chosen.or(usual[place]);
         }
-        let numbers = [0, 1].map(|place| {
-            self.chosen[place].or(rows.len().checked_sub(2 - place).map(|index| rows[index].number))
-        });
         let [Some(old), Some(new)] = numbers.map(|number| ledger.row(number?)) else {
             hint_ui(ui, "Two rows are needed.");
             return;
         };
         ScrollArea::both().id_salt("changes").auto_shrink(false).show(ui, |ui| differences_ui(old, new, ui));
     }
+}
+
+/// The two ticked rows, or the last two of all.
+fn usual(ledger: &Ledger, ticked: &BTreeSet<u64>) -> [Option<u64>; 2] {
+    if let (2, Some(first), Some(last)) = (ticked.len(), ticked.first(), ticked.last()) {
+        return [Some(*first), Some(*last)];
+    }
+    let rows = ledger.rows();
+    [2, 1].map(|back| rows.len().checked_sub(back).map(|index| rows[index].number))
 }
 
 /// Another row where one was chosen.
@@ -69,9 +81,10 @@ fn differences_ui(old: &Run, new: &Run, ui: &mut Ui) {
             ui.end_row();
         }
         for row in &found {
-            ui.label(RichText::new(&row.key).small());
-            ui.label(mono(text(row.old.as_ref())));
-            ui.label(mono(text(row.new.as_ref())));
+            cell_ui(ui, KEY_WIDTH, RichText::new(&row.key).small());
+            for value in [&row.old, &row.new] {
+                cell_ui(ui, TEXT_WIDTH, mono(text(value.as_ref())));
+            }
             let numbers = (&row.old, &row.new);
             let relative = match numbers {
                 (Some(Value::Number(old)), Some(Value::Number(new))) => change(*old, *new),
@@ -85,6 +98,14 @@ fn differences_ui(old: &Run, new: &Run, ui: &mut Ui) {
     for run in [old, new] {
         hint_ui(ui, format!("{}: {}", run.number, run.result));
     }
+}
+
+/// A text that is cut where it is longer than `width`; a tip has all of it then.
+fn cell_ui(ui: &mut Ui, width: f32, text: RichText) {
+    ui.horizontal(|ui| {
+        ui.set_max_width(width);
+        ui.add(Label::new(text).truncate());
+    });
 }
 
 fn text(value: Option<&Value>) -> String {

@@ -207,11 +207,11 @@ impl RunsTab {
             });
         let panes = [
             Pane::middle(Part::Overlay, "Runs over each other", 390.0),
-            Pane::right(Part::Changes, "What changed", 360.0, 240.0..=640.0),
+            Pane::right(Part::Changes, "What changed", 440.0, 240.0..=640.0),
         ];
         panes_ui(ui, "runs", &panes, |part, ui| match part {
             Part::Overlay => self.overlay.ui(&self.ledger, &self.ticked, context.commands, ui),
-            Part::Changes => self.changes.ui(&self.ledger, ui),
+            Part::Changes => self.changes.ui(&self.ledger, &self.ticked, ui),
         });
     }
 }

@@ -176,8 +176,9 @@ impl Run {
 /// Values of all series that are kept; those of older runs go first.
 const MOST_VALUES: usize = 16_000_000;
 
-/// The largest number of a row that a file may have: whatever reads the file as JSON has it exactly.
-const LARGEST_NUMBER: u64 = 1 << 53;
+/// The largest number of a row that a file may have: what comes after it, for longer than anybody runs things, is still
+/// read exactly by whatever reads the file as JSON.
+const LARGEST_NUMBER: u64 = (1 << 53) - (1 << 32);
 
 /// All rows; a part of the session's file. A copy shares them.
 #[derive(Clone, Debug, Default)]
@@ -247,13 +248,19 @@ impl Ledger {
     pub(crate) fn from_value(value: &serde_json::Value) -> Result<(Self, Option<String>), String> {
         let kept = value.get("rows").and_then(serde_json::Value::as_array).ok_or("“runs” cannot be read")?;
         let read = kept.iter().filter_map(|row| Run::deserialize(row).ok());
-        let mut rows: Vec<Arc<Run>> = read.filter(|row| row.number <= LARGEST_NUMBER).map(Arc::new).collect();
+        let mut rows: Vec<Run> = read.collect();
         rows.sort_by_key(|row| row.number);
         rows.dedup_by_key(|row| row.number);
         let missing = kept.len() - rows.len();
-        let last = value.get("last").and_then(serde_json::Value::as_u64).unwrap_or(0).min(LARGEST_NUMBER);
-        let last = rows.last().map_or(0, |row| row.number).max(last);
-        let problem = (missing > 0).then(|| format!("“runs” has {missing} rows that cannot be read"));
+        let mut problem = (missing > 0).then(|| format!("“runs” has {missing} rows that cannot be read"));
+        let last =
+            value.get("last").and_then(serde_json::Value::as_u64).filter(|last| *last <= LARGEST_NUMBER);
+        if rows.last().is_some_and(|row| row.number > LARGEST_NUMBER) {
+            (1..).zip(&mut rows).for_each(|(number, row)| row.number = number);
+            problem = Some("“runs” has numbers without end: its rows are numbered anew".to_owned());
+        }
+        let last = rows.last().map_or(0, |row| row.number).max(last.unwrap_or(0));
+        let rows = rows.into_iter().map(Arc::new).collect();
         Ok((Self { last, rows, deleted: Vec::new(), opened_at: None }, problem))
     }
 
@@ -538,23 +545,37 @@ mod tests {
     }
 
     #[test]
-    fn no_number_of_a_file_is_so_large_that_the_next_one_fails() {
+    fn no_number_of_a_file_is_so_large_that_runs_after_it_are_lost() {
         let mut ledger = Ledger::default();
-        ledger.add(run(0, &presets::paper()), 7);
-        for (last, number, rows) in [
-            (u64::MAX, 1, 1),
-            (0, u64::MAX, 0),
-            (LARGEST_NUMBER + 1, LARGEST_NUMBER, 1),
-            (3, LARGEST_NUMBER + 1, 0),
+        for _ in 0..2 {
+            ledger.add(run(0, &presets::paper()), 7);
+        }
+        let end = 1_u64 << 53;
+        for (last, numbers, read_as) in [
+            (u64::MAX, [1, 2], [1, 2]),
+            (end, [1, 2], [1, 2]),
+            (0, [5, u64::MAX], [1, 2]),
+            (end, [end, end - 1], [1, 2]),
+            (end, [9, end], [1, 2]),
+            (3, [9, end + 1], [1, 2]),
+            (3, [9, LARGEST_NUMBER], [9, LARGEST_NUMBER]),
         ] {
             let mut value = ledger.to_value();
             value["last"] = last.into();
-            value["rows"][0]["number"] = number.into();
+            for (row, number) in numbers.into_iter().enumerate() {
+                value["rows"][row]["number"] = number.into();
+            }
             let (mut read, problem) = Ledger::from_value(&value).unwrap();
-            assert_eq!((read.rows().len(), problem.is_some()), (rows, rows == 0), "{last} {number}");
+            let found: Vec<u64> = read.rows().iter().map(|row| row.number).collect();
+            assert_eq!(
+                (&found[..], problem.is_some()),
+                (&read_as[..], numbers != read_as),
+                "{last} {numbers:?}"
+            );
             let next = read.add(run(0, &presets::paper()), 8);
-            assert!(next > number.min(LARGEST_NUMBER) * rows as u64, "{last} {number}: {next}");
-            assert_eq!(read.row(next).map(|run| run.unix_s), Some(8));
+            assert!(next > found[1] && next < end, "{last} {numbers:?}: {next}");
+            let (again, _) = Ledger::from_value(&read.to_value()).unwrap();
+            assert_eq!(again.rows().len(), 3, "{last} {numbers:?}");
         }
     }
 

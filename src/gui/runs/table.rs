@@ -14,10 +14,14 @@ use crate::widgets::{hint_ui, mono, section_ui};
 const ROW_HEIGHT: f32 = 24.0;
 const COLUMNS: [&str; 10] =
     ["show", "run", "UTC", "kind", "what", "seed", "Q | R", "sources", "result", "note"];
-/// Place of the result among the columns.
+/// Places of what was run, the result and the note among the columns.
+const TITLE: usize = 4;
 const RESULT: usize = 8;
+const NOTE: usize = 9;
 const SPACING: f32 = 12.0;
 const NOTE_WIDTH: f32 = 150.0;
+/// Greatest width of what was run; a tip has all of it.
+const TITLE_WIDTH: f32 = 260.0;
 /// Least and greatest width of a result.
 const RESULT_WIDTH: [f32; 2] = [160.0, 620.0];
 
@@ -137,7 +141,7 @@ impl RunTable {
             ui.label(mono(clock(run.unix_s))).on_hover_text(format!("{} seconds since 1970", run.unix_s))
         });
         self.cell_ui(3, ui, |ui| ui.label(run.kind.name()));
-        self.cell_ui(4, ui, |ui| title_ui(context, run, ui));
+        self.cell_ui(TITLE, ui, |ui| title_ui(context, run, ui));
         self.cell_ui(5, ui, |ui| ui.label(mono(run.seed.map_or("–".to_owned(), |seed| seed.to_string()))));
         self.cell_ui(6, ui, |ui| ui.label(mono(run.weights()).small()));
         self.cell_ui(7, ui, |ui| {
@@ -148,6 +152,8 @@ impl RunTable {
             ui.set_max_width(result);
             ui.add(Label::new(RichText::new(&run.result).small()).truncate()).on_hover_text(&run.result)
         });
+        let width = &mut self.widths[NOTE];
+        *width = width.max(NOTE_WIDTH + 2.0 * ui.spacing().button_padding.x);
         self.note_ui(context, run, ui);
     }
 
@@ -219,11 +225,13 @@ fn tick_ui(context: &ViewContext<'_>, run: &Run, ticked: &mut BTreeSet<u64>, ui:
 
 /// What a row was; a right click offers its command.
 fn title_ui(context: &ViewContext<'_>, run: &Run, ui: &mut Ui) {
-    let title = ui.add(Label::new(&run.title).sense(Sense::click()));
-    let title = match &run.command {
-        Some(command) => title.on_hover_text(format!("{command}\n(right click: copy as a command)")),
-        None => title,
-    };
+    ui.set_max_width(TITLE_WIDTH);
+    let title =
+        ui.add(Label::new(&run.title).truncate().show_tooltip_when_elided(false).sense(Sense::click()));
+    let title = title.on_hover_text(match &run.command {
+        Some(command) => format!("{}\n{command}\n(right click: copy as a command)", run.title),
+        None => run.title.clone(),
+    });
     title.context_menu(|ui| {
         let copy = ui.add_enabled(run.command.is_some(), Button::new("Copy as a command"));
         if copy.on_hover_text("What makes this run again in a terminal").clicked() {

@@ -59,13 +59,14 @@ fn experiments_are_rows_that_are_compared_shifted_noted_and_deleted_with_undo() 
     click(&mut window, "No shift");
     assert_eq!(state(&window)["runs_tab"]["shifts_s"], serde_json::json!({}));
 
-    // From row 3 to row 4 at first; from row 2 it is the weight and the seed.
-    window.get_by_label("setting.controller");
+    // From the one ticked row to the other at first; from row 2 it is the controller too.
+    window.get_by_label_contains("lqr.q");
+    window.get_by_label("+150 %");
+    assert!(window.query_by_label("setting.controller").is_none());
     window.get_by_label("from run").click();
     window.run_steps(3);
     click(&mut window, "2  flat, FLQR");
-    window.get_by_label_contains("lqr.q");
-    window.get_by_label("+150 %");
+    window.get_by_label("setting.controller");
 
     enter(&mut window, "note of run 2", "quiet");
     assert_eq!(rows(&window)[1]["note"], "quiet");

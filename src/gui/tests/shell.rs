@@ -5,7 +5,7 @@
 mod common;
 
 use common::{SIZE, Window, click, command, open, options, state};
-use egui::{Event, Key, Modifiers};
+use egui::{Event, Key, Modifiers, vec2};
 use egui_kittest::kittest::Queryable;
 use flqr_gui::{Tab, WindowOptions};
 use serde_json::json;
@@ -192,5 +192,25 @@ fn nothing_of_a_page_lies_beyond_the_window() {
                 .collect();
             assert!(beyond.is_empty(), "{} at {width}: {beyond:?}", tab.title());
         }
+    }
+}
+
+/// A screen of 1280 by 800 pixels at scale 2, and less.
+#[test]
+fn a_small_window_keeps_every_page_and_source_within_reach() {
+    for (size, has_tabs) in [(vec2(640.0, 376.0), true), (vec2(480.0, 320.0), false)] {
+        let mut window = open(options(Tab::Tune), size);
+        for (key, title) in [("friction", "Friction"), ("experiments", "Experiments"), ("runs", "Runs")] {
+            if !has_tabs {
+                let front = Tab::from_key(state(&window)["tab"].as_str().unwrap()).unwrap();
+                click(&mut window, front.title());
+            }
+            click(&mut window, title);
+            assert_eq!(state(&window)["tab"], key, "{size}");
+        }
+        assert!(window.get_by_label("simulated").rect().right() <= size.x, "{size}");
+        click(&mut window, "simulated");
+        click(&mut window, "replay");
+        assert_eq!(state(&window)["source"], "replay", "{size}");
     }
 }

@@ -326,6 +326,7 @@ fn a_log_of_a_linear_axis_is_fitted_although_the_model_is_a_robot() {
     let mass = ended["friction_tab"]["fit"]["parameters"]["mass_kg"]["value"].as_f64();
     assert!(mass.is_some_and(|mass| (mass - 20.0).abs() < 0.4), "{ended:#}");
     window.get_by_label_contains("open the model of a linear axis");
+    window.get_by_label_contains("means from peak to peak");
     click(&mut window, "Both motors");
     assert_eq!(state(&window)["friction"], ended["friction"], "newtons are no torque");
 }

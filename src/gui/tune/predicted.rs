@@ -298,5 +298,6 @@ pub(super) fn quiet_plot<'a>(ui: &Ui, size: Vec2, x_label: &'a str, y_label: &'a
         .allow_boxed_zoom(false)
         .allow_axis_zoom_drag(false)
         .label_formatter(|_| None);
-    Axes { x_label: Some(x_label), y_label, x_lines: 4.0, y_lines: 4.0 }.on(plot, ui.visuals())
+    Axes { x_label: Some(x_label), y_label, height: size.y, x_lines: 4.0, y_lines: 4.0 }
+        .on(plot, ui.visuals())
 }

@@ -7,7 +7,7 @@ use nalgebra::DVector;
 use super::kinematics::{Sieve, Stretch, stretches};
 use super::regression::{Normal, half_widths, residual};
 use super::stribeck_search::{Shape, Span, search};
-use super::{Axis, KnownAxis, MotionError, MotionFit, MotionParameter, place};
+use super::{Axis, KnownAxis, MotionError, MotionFit, MotionParameter, MotionSeries, place};
 use crate::record::Log;
 
 /// Sine of a column's angle to the others below which its parameter is not told from them.
@@ -41,6 +41,8 @@ pub(super) struct Problem {
     moving: Vec<Moving>,
     /// Columns in the order of [`place`], the shape's two of them for no Stribeck curve.
     columns: Vec<Vec<f64>>,
+    /// Time of each row, s.
+    time_s: Vec<f64>,
     effort: Vec<f64>,
     /// Rows of sign(v), of which the shape's two columns are parts.
     directions: Vec<f64>,
@@ -67,6 +69,7 @@ impl Problem {
             sieves: Vec::new(),
             moving: Vec::new(),
             columns: vec![Vec::new(); place::LINEAR],
+            time_s: Vec::new(),
             effort: Vec::new(),
             directions: Vec::new(),
             values: known_values(known),
@@ -109,6 +112,9 @@ impl Problem {
             let resting = near_rest(&motion.speed, rest_speed, sieve.blur());
             let kept: Vec<bool> =
                 sieve.row_samples(resting.len(), step_s).map(|sample| !resting[sample]).collect();
+            let times = sieve.row_samples(resting.len(), step_s).map(|sample| sample as f64 * step_s);
+            let times: Vec<f64> = times.map(|time| stretch.start_s + time).collect();
+            self.time_s.extend(chosen(&times, &kept));
             let load: Vec<f64> = stretch.position.iter().map(|angle| angle.sin()).collect();
             let ones = vec![1.0; load.len()];
             let signs: Vec<f64> = motion.speed.iter().map(|&v| direction(v)).collect();
@@ -364,7 +370,15 @@ impl Problem {
         let relative_error = (sum(&left) / sum(&self.effort)).sqrt();
         let rmse = (sum(&left) / left.len() as f64).sqrt();
         self.warn_of_values(&parameters, rmse, relative_error);
+        let fitted = self.effort.iter().zip(&left).map(|(effort, left)| effort - left).collect();
+        let series = MotionSeries {
+            time_s: self.time_s,
+            speed: std::mem::take(&mut self.columns[place::VISCOUS]),
+            measured: self.effort,
+            fitted,
+        };
         MotionFit {
+            series,
             rmse,
             rmse_unit: self.axis.effort_unit(),
             relative_error,

@@ -242,6 +242,25 @@ fn a_made_shaft_gives_back_its_parameters() {
     }
 }
 
+/// The drive is known and far slower than the filters, so that the filtered torque is the drive itself but for their
+/// ripple of about one percent; a row later it would be up to 0.06 N m off.
+#[test]
+fn the_rows_of_a_fit_are_what_was_measured_and_what_the_model_makes_of_it() {
+    let log = SHAFT.log(Axis::Rotary);
+    let found = fit(&[log.clone(), log], Axis::Rotary, None, &[]);
+    let MotionSeries { time_s, speed, measured, fitted } = &found.series;
+    assert_eq!([speed.len(), measured.len(), fitted.len(), time_s.len()], [found.rows; 4]);
+    for (time, torque) in time_s.iter().zip(measured) {
+        assert!((torque - (SHAFT.drive)(*time)).abs() < 0.01, "{torque} N m at {time} s");
+    }
+    let squares: f64 = measured.iter().zip(fitted).map(|(is, model)| (is - model).powi(2)).sum();
+    assert!(((squares / found.rows as f64).sqrt() / found.rmse - 1.0).abs() < 1e-9, "{}", found.rmse);
+    let back = time_s.windows(2).filter(|pair| pair[1] <= pair[0]).count();
+    assert_eq!(back, 1, "log after log");
+    let power: f64 = speed.iter().zip(measured).map(|(speed, torque)| speed * torque).sum();
+    assert!(power > 0.0, "friction takes power");
+}
+
 #[test]
 fn a_made_carriage_gives_back_its_parameters() {
     let carriage = Plant {

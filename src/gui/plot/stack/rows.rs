@@ -4,7 +4,7 @@ use egui::{Color32, EventFilter, Ui, vec2};
 use egui_plot::{PlotPoint, PlotResponse};
 
 use super::{Around, Panel, Stack, cache, cache_key, indexed, plot_id};
-use crate::plot::axes::{Extras, Right, SecondAxis};
+use crate::plot::axes::{Extras, Right, SecondAxis, X_AXIS_HEIGHT};
 use crate::plot::decimate::RangeStatistics;
 use crate::plot::unit::label;
 use crate::plot::view::{Drawing, TimePlot, columns, interact, y_range};
@@ -13,8 +13,6 @@ use crate::plot::view::{Drawing, TimePlot, columns, interact, y_range};
 const STATISTICS_WIDTH: f32 = 118.0;
 /// The plots alone get a page that is narrower.
 const LEAST_WIDTH_WITH_STATISTICS: f32 = 400.0;
-/// Height of the horizontal axis with its label.
-const X_AXIS_HEIGHT: f32 = 36.0;
 /// Plots are at least this high; more of them scroll.
 const LEAST_HEIGHT: f32 = 30.0;
 

@@ -45,7 +45,10 @@ impl Stack {
             if let Some(cursor) = cursor {
                 let indexed = indexed(&mut self.caches, row.panel, curve, self.units);
                 let value = indexed.held_at(cursor).map_or(f64::NAN, |index| indexed.y(index));
-                let text = format!("{name:<5}{:>8}", to_scale(value, row.panel.min_span * row.scale));
+                // As many digits as can be told apart in the plot, and one more.
+                let peak = found.map_or(0.0, |found| found.peak_to_peak());
+                let scale = (row.panel.min_span * row.scale).max(0.1 * peak);
+                let text = format!("{name:<6.6}{:>9}", to_scale(value, scale));
                 ui.label(mono(text).color(curve.color)).on_hover_text("Value at the time that is shown");
                 continue;
             }

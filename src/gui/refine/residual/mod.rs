@@ -1,10 +1,9 @@
 //! Measured against the model, and what the difference depends on.
 
-mod bins;
 mod in_time;
 mod over;
 
-use egui::{Color32, RichText, ScrollArea, Ui, vec2};
+use egui::{ScrollArea, Ui, vec2};
 use flqr_core::refine::{Explorer, Refinement, Residual};
 
 use super::compare;
@@ -12,7 +11,7 @@ use super::run::Answered;
 use super::strip::{StepState, Tone};
 use crate::command::Commands;
 use crate::theme::palette;
-use crate::widgets::{hint_ui, section_ui, shown};
+use crate::widgets::{hint_ui, legend_ui, section_ui, shown};
 use in_time::InTime;
 use over::{Over, orders_summary, orders_ui};
 
@@ -128,10 +127,4 @@ impl ResidualStep {
             }
         });
     }
-}
-
-fn legend_ui(ui: &mut Ui, name: &str, color: Color32) {
-    ui.label(RichText::new(name).small().strong().color(color));
-    let (rect, _) = ui.allocate_exact_size(vec2(16.0, 12.0), egui::Sense::hover());
-    ui.painter().hline(rect.x_range(), rect.center().y, egui::Stroke::new(2.5, color));
 }

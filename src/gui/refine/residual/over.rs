@@ -6,8 +6,7 @@ use egui::{ComboBox, Ui, Vec2, vec2};
 use egui_plot::{FilledArea, Line, MarkerShape, Plot, PlotPoint, PlotPoints, Points};
 use flqr_core::refine::{Explorer, Variable};
 
-use super::bins::{Band, Bin, binned};
-use crate::plot::Axes;
+use crate::plot::{Axes, Band, Bin, binned};
 use crate::theme::palette;
 use crate::widgets::{choice_ui, hint_ui, shown};
 
@@ -220,6 +219,6 @@ pub(super) fn orders_summary(explorer: &Explorer) -> String {
 fn chart<'a>(id: &'a str, ui: &Ui, size: Vec2, (x_label, y_label): (&'a str, &'a str)) -> Plot<'a> {
     let size = size.max(vec2(1.0, 1.0));
     let plot = Plot::new(id).width(size.x).height(size.y).allow_scroll(false).label_formatter(|_| None);
-    Axes { x_label: Some(x_label), y_label, x_lines: 0.012 * f64::from(size.x), y_lines: 5.0 }
-        .on(plot, ui.visuals())
+    let x_lines = 0.012 * f64::from(size.x);
+    Axes { x_label: Some(x_label), y_label, height: size.y, x_lines, y_lines: 5.0 }.on(plot, ui.visuals())
 }

@@ -1,8 +1,8 @@
-//! Means of a residual over a variable, with bands.
+//! Means of a residual over a variable, with bands, for every page that shows one.
 
 /// What the band about a mean is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) enum Band {
+pub(crate) enum Band {
     /// Twice the standard error of the mean, as if the rows were independent.
     #[default]
     Error,
@@ -12,12 +12,12 @@ pub(super) enum Band {
 
 /// Rows next to each other in the variable.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Bin {
+pub(crate) struct Bin {
     /// Mean of the variable.
-    pub(super) x: f64,
-    pub(super) mean: f64,
-    pub(super) low: f64,
-    pub(super) high: f64,
+    pub(crate) x: f64,
+    pub(crate) mean: f64,
+    pub(crate) low: f64,
+    pub(crate) high: f64,
 }
 
 /// Fewest rows in a bin.
@@ -25,7 +25,7 @@ const LEAST_ROWS: usize = 8;
 
 /// Bins of equal numbers of rows, at most `most`, in rising order of the variable. Rows that are not finite are left
 /// out; rows of the same value of the variable may stand in several bins.
-pub(super) fn binned(x: &[f64], y: &[f64], most: usize, band: Band) -> Vec<Bin> {
+pub(crate) fn binned(x: &[f64], y: &[f64], most: usize, band: Band) -> Vec<Bin> {
     let pairs = x.iter().zip(y).map(|(x, y)| [*x, *y]);
     let mut pairs: Vec<[f64; 2]> = pairs.filter(|pair| pair.iter().all(|value| value.is_finite())).collect();
     pairs.sort_by(|a, b| a[0].total_cmp(&b[0]));
