@@ -188,11 +188,14 @@ impl Spectrum {
         place as f64 / (2 * (self.power.len() - 1)) as f64 / self.step_s
     }
 
+    /// Powers from one frequency to another.
+    fn inside(&self, band: [f64; 2]) -> Vec<f64> {
+        let places = (0..self.power.len()).filter(|&place| (band[0]..=band[1]).contains(&self.hz(place)));
+        places.map(|place| self.power[place]).collect()
+    }
+
     fn level(&self, band: [f64; 2]) -> f64 {
-        let inside: Vec<f64> = (0..self.power.len())
-            .filter(|&place| (band[0]..band[1]).contains(&self.hz(place)))
-            .map(|place| self.power[place])
-            .collect();
+        let inside = self.inside(band);
         if inside.is_empty() { self.power[0] } else { inside.iter().sum::<f64>() / inside.len() as f64 }
     }
 
@@ -203,15 +206,10 @@ impl Spectrum {
 
     /// Mean level between two frequencies of what is no line.
     fn level_without_lines(&self, band: [f64; 2]) -> f64 {
-        let inside = || {
-            let places = (0..self.power.len()).filter(|&place| (band[0]..=band[1]).contains(&self.hz(place)));
-            places.map(|place| self.power[place])
-        };
-        let most = self.line() * quantile(&inside().collect::<Vec<_>>(), 0.5);
-        let (sum, count) = inside()
-            .filter(|power| *power <= most)
-            .fold((0.0, 0.0), |(sum, count), power| (sum + power, count + 1.0));
-        sum / f64::max(count, 1.0)
+        let inside = self.inside(band);
+        let most = self.line() * quantile(&inside, 0.5);
+        let noise = inside.iter().filter(|power| **power <= most);
+        noise.clone().sum::<f64>() / f64::max(noise.count() as f64, 1.0)
     }
 
     /// Takes out what is not noise.

@@ -1,5 +1,6 @@
 //! What makes a robot's log unfit, said before any effect is named.
 
+use crate::effects::Machine;
 use crate::model_file::RobotModel;
 use crate::record::{self, HealthFinding, Log, Severity};
 use crate::refine::rates;
@@ -226,8 +227,8 @@ fn of_signals(log: &Log, readings: &Readings, robot: &RobotModel) -> Vec<HealthF
 /// More than a motor gives: some times its limit, or what holds the robot's whole weight at the length of its body.
 fn most_torque_nm(robot: &RobotModel) -> f64 {
     let p = &robot.parameters;
-    let weight_n = (p.body_mass_kg + 2.0 * p.wheel_mass_kg) * p.gravity_m_s2;
-    robot.limits.torque_nm.map_or(weight_n * (p.com_height_m + p.wheel_radius_m), |limit| MANY * limit)
+    let toppled_nm = Machine::robot(robot).weight_n() * (p.com_height_m + p.wheel_radius_m);
+    robot.limits.torque_nm.map_or(toppled_nm, |limit| MANY * limit)
 }
 
 /// A wheel's angle, or a motor's torque, that stays where it is for long while the other one goes on.
@@ -281,7 +282,8 @@ fn one_torque_off(readings: &Readings) -> Option<HealthFinding> {
     } else {
         return None;
     };
-    let mend = "map the one that is off, --map torque_left_nm=torque_left_nm*FACTOR or --map torque_right_nm=torque_right_nm*FACTOR";
+    let mend = "map the one that is off, --map torque_left_nm=torque_left_nm*FACTOR \
+                or --map torque_right_nm=torque_right_nm*FACTOR";
     Some(finding(Severity::Error, "torque_right_nm", problem, mend))
 }
 

@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 use pulp::{Simd, WithSimd};
 
 /// Rows of one chunk, whose products stay near the processor.
-const CHUNK: usize = 512;
+const CHUNK: usize = 256;
 /// Columns on either side of a tile.
 const TILE: usize = 4;
 
@@ -81,50 +81,71 @@ impl WithSimd for AddProducts<'_> {
     fn with_simd<S: Simd>(self, simd: S) {
         let Self { gram, columns, rows } = self;
         let count = columns.len();
+        let corners = || (0..count).step_by(TILE).flat_map(|j| (j..count).step_by(TILE).map(move |i| (i, j)));
+        let mut tiles: Vec<Tile<S>> = corners().map(|_| Tile::new(simd)).collect();
         for from in rows.clone().step_by(CHUNK) {
             let chunk = from..(from + CHUNK).min(rows.end);
             // Columns beyond the last are the last again, and their sums are dropped.
-            let tile = |first: usize| -> [&[f64]; TILE] {
+            let side = |first: usize| -> [&[f64]; TILE] {
                 std::array::from_fn(|i| &columns[(first + i).min(count - 1)][chunk.clone()])
             };
-            for right in (0..count).step_by(TILE) {
-                for left in (right..count).step_by(TILE) {
-                    let sums = products(simd, tile(left), tile(right));
-                    for (j, sums) in (right..count).zip(sums) {
-                        for (i, sum) in (left..count).zip(sums) {
-                            gram[(i, j)] += sum;
-                        }
-                    }
+            for (tile, (left, right)) in tiles.iter_mut().zip(corners()) {
+                tile.add(simd, side(left), side(right));
+            }
+        }
+        for (tile, (left, right)) in tiles.iter().zip(corners()) {
+            for (j, sums) in (right..count).zip(tile.sums(simd)) {
+                for (i, sum) in (left..count).zip(sums) {
+                    gram[(i, j)] += sum;
                 }
             }
         }
     }
 }
 
-/// Σ left right for each pair: those with the first of `right` first.
-#[inline(always)]
-fn products<S: Simd>(simd: S, left: [&[f64]; TILE], right: [&[f64]; TILE]) -> [[f64; TILE]; TILE] {
-    let split = |column: &'_ [f64]| S::as_simd_f64s(column).1.len();
-    let (rest, whole) = (split(left[0]), S::as_simd_f64s(left[0]).0.len());
-    let vectors = |columns: [&'_ [f64]; TILE], place: usize| -> [S::f64s; TILE] {
-        std::array::from_fn(|i| S::as_simd_f64s(columns[i]).0[place])
-    };
-    let mut sums = [[simd.splat_f64s(0.0); TILE]; TILE];
-    for place in 0..whole {
-        let (left, right) = (vectors(left, place), vectors(right, place));
-        for (sums, right) in sums.iter_mut().zip(right) {
+/// Σ left right for each pair of a tile's columns, those with the first of `right` first: lanes side by side, and the
+/// rows that fill no lane.
+struct Tile<S: Simd> {
+    lanes: [[S::f64s; TILE]; TILE],
+    rest: [[f64; TILE]; TILE],
+}
+
+impl<S: Simd> Tile<S> {
+    #[inline(always)]
+    fn new(simd: S) -> Self {
+        Self { lanes: [[simd.splat_f64s(0.0); TILE]; TILE], rest: [[0.0; TILE]; TILE] }
+    }
+
+    #[inline(always)]
+    fn add(&mut self, simd: S, left: [&[f64]; TILE], right: [&[f64]; TILE]) {
+        let whole = S::as_simd_f64s(left[0]).0.len();
+        let lanes_of = left.map(|column| &S::as_simd_f64s(column).0[..whole]);
+        let lanes_with = right.map(|column| &S::as_simd_f64s(column).0[..whole]);
+        let mut sums = self.lanes;
+        for place in 0..whole {
+            let left = lanes_of.map(|column| column[place]);
+            let right = lanes_with.map(|column| column[place]);
+            for (sums, right) in sums.iter_mut().zip(right) {
+                for (sum, left) in sums.iter_mut().zip(left) {
+                    *sum = simd.mul_add_e_f64s(left, right, *sum);
+                }
+            }
+        }
+        self.lanes = sums;
+        let (left, right) = (left.map(|c| S::as_simd_f64s(c).1), right.map(|c| S::as_simd_f64s(c).1));
+        for (sums, right) in self.rest.iter_mut().zip(right) {
             for (sum, left) in sums.iter_mut().zip(left) {
-                *sum = simd.mul_add_e_f64s(left, right, *sum);
+                *sum += left.iter().zip(right).map(|(a, b)| a * b).sum::<f64>();
             }
         }
     }
-    let cut = left[0].len() - rest;
-    std::array::from_fn(|j| {
-        std::array::from_fn(|i| {
-            let rest: f64 = left[i][cut..].iter().zip(&right[j][cut..]).map(|(a, b)| a * b).sum();
-            simd.reduce_sum_f64s(sums[j][i]) + rest
+
+    #[inline(always)]
+    fn sums(&self, simd: S) -> [[f64; TILE]; TILE] {
+        std::array::from_fn(|j| {
+            std::array::from_fn(|i| simd.reduce_sum_f64s(self.lanes[j][i]) + self.rest[j][i])
         })
-    })
+    }
 }
 
 fn mirror(gram: &mut DMatrix<f64>) {

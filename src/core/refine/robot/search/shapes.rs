@@ -1,10 +1,10 @@
 //! Shapes of candidates, refined.
 
 use crate::effects::{Grid, MachineKind, Parameter, Step};
+use crate::refine::select::Member;
 
 use super::screen::Screen;
 use super::{Candidate, Fit, Search};
-use crate::refine::select::Member;
 
 /// Times that sizes in shapes are moved.
 const SETTLING: usize = 3;
