@@ -4,7 +4,8 @@
 #   .ci/pictures.sh BINARY OUTDIR [WIDTHxHEIGHT] [STEPS-OF-ZOOM]
 #
 # Each page with something on it, dark (NAME.png) and light (NAME-light.png), at 1280x800 unless another size is given,
-# each step of zoom (as Ctrl and +) a tenth larger. The README's pictures: .ci/pictures.sh target/release/flqr assets
+# each step of zoom (as Ctrl and +) a tenth larger; with WINIT_X11_SCALE_FACTOR=2 before it as on a screen of scale 2.
+# The README's pictures: .ci/pictures.sh target/release/flqr assets
 set -euo pipefail
 
 usage="usage: .ci/pictures.sh BINARY OUTDIR [WIDTHxHEIGHT] [STEPS-OF-ZOOM]"
@@ -15,6 +16,7 @@ out=$(mktemp -d)
 source "$(dirname "$0")/display.sh"
 model=$(realpath "$(dirname "$0")/../presets/paper.toml")
 zoom=${4:-0}
+scale=${WINIT_X11_SCALE_FACTOR:-1}
 
 # both NAME: the page as it is, dark and light.
 both() {
@@ -84,7 +86,8 @@ until_state 20 "the page of runs is there" '.tab == "runs"'
 if [ "$zoom" = 0 ]; then
     # The boxes of the second and the third row: both runs of the experiment, below the refinement.
     for y in 151 176; do
-        xdotool mousemove 20 "$y"
+        # Below the window's title, 20 pixels at any scale.
+        xdotool mousemove $((20 * scale)) $((20 + (y - 20) * scale))
         sleep 0.3
         xdotool click 1
         sleep 0.5

@@ -7,7 +7,7 @@ use egui::{CentralPanel, Frame, Id, Margin, Panel, ScrollArea, Ui};
 /// Space at the left and right of a pane's content, in points.
 pub(crate) const MARGIN: f32 = 10.0;
 
-/// What fills what the others leave is at least this high: a lower page scrolls.
+/// What fills what the others leave is at least this high unless it says more: a lower page scrolls.
 const LEAST_HEIGHT: f32 = 420.0;
 
 /// One pane; `key` is what the page calls it.
@@ -16,6 +16,7 @@ pub(crate) struct Pane<K> {
     name: &'static str,
     place: Place,
     width: f32,
+    least_height: f32,
     wanted: bool,
 }
 
@@ -28,17 +29,22 @@ enum Place {
 impl<K> Pane<K> {
     /// At the left, `width` wide until it is dragged within `widths`; scrolls.
     pub(crate) fn left(key: K, name: &'static str, width: f32, widths: RangeInclusive<f32>) -> Self {
-        Self { key, name, place: Place::Left(widths), width, wanted: false }
+        Self { key, name, place: Place::Left(widths), width, least_height: LEAST_HEIGHT, wanted: false }
     }
 
     /// What is left between the others, and at least `width`.
     pub(crate) fn middle(key: K, name: &'static str, width: f32) -> Self {
-        Self { key, name, place: Place::Middle, width, wanted: false }
+        Self { key, name, place: Place::Middle, width, least_height: LEAST_HEIGHT, wanted: false }
     }
 
     /// As [`Self::left`], at the right.
     pub(crate) fn right(key: K, name: &'static str, width: f32, widths: RangeInclusive<f32>) -> Self {
-        Self { key, name, place: Place::Right(widths), width, wanted: false }
+        Self { key, name, place: Place::Right(widths), width, least_height: LEAST_HEIGHT, wanted: false }
+    }
+
+    /// In the middle, at least `height` high.
+    pub(crate) fn at_least(self, height: f32) -> Self {
+        Self { least_height: height, ..self }
     }
 
     /// Brought to the front where `wanted`: something in it is about to take the keyboard.
@@ -103,12 +109,12 @@ pub(crate) fn panes_ui<K: Copy>(
         );
     }
     CentralPanel::default().frame(central).show(ui, |ui| match panes.get(filling) {
-        Some(Pane { key, place: Place::Middle, .. }) if ui.available_height() >= LEAST_HEIGHT => {
-            show(*key, ui)
-        }
-        Some(Pane { key, place: Place::Middle, .. }) => {
+        Some(Pane { key, place: Place::Middle, least_height, .. }) => {
+            if ui.available_height() >= *least_height {
+                return show(*key, ui);
+            }
             ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-                let size = egui::vec2(ui.available_width(), LEAST_HEIGHT);
+                let size = egui::vec2(ui.available_width(), *least_height);
                 ui.allocate_ui(size, |ui| show(*key, ui));
             });
         }

@@ -18,6 +18,7 @@ use crate::widgets::choice_ui;
 const ROOM_FOR_SOURCES: f32 = 1020.0;
 const ROOM_FOR_BUTTONS: f32 = 780.0;
 const ROOM_FOR_TABS: f32 = 600.0;
+const LEAST_NAME_WIDTH: f32 = 80.0;
 
 impl App {
     pub(super) fn shell_ui(&mut self, ui: &mut Ui) {
@@ -143,6 +144,10 @@ impl App {
 
     fn model_name_ui(&self, ui: &mut Ui) {
         let changed = self.session != self.saved;
+        // A few letters of it say nothing.
+        if ui.available_width() < LEAST_NAME_WIDTH {
+            return;
+        }
         // The mark keeps its room whatever the length of the name.
         let room = ui.available_width() - if changed { 66.0 } else { 0.0 };
         ui.scope(|ui| {

@@ -210,8 +210,8 @@ impl FitRun {
         self.job = None;
         Some(match result {
             Ok((report, sources)) => {
-                let text =
-                    format!("The fit ended with an error of {:.3e} {}.", report.rmse, report.rmse_unit);
+                let error = shown(report.rmse, 4);
+                let text = format!("The fit ended with an error of {error} {}.", report.rmse_unit);
                 self.show_history(&report);
                 self.finished = self.made_with.take().map(|made_with| made_with.row(&report, sources));
                 self.motion = MotionChart::new(&report);

@@ -145,7 +145,7 @@ impl FrictionTab {
     pub(crate) fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
         let panes = [
             Pane::left(Part::Log, "Log and fit", 330.0, 280.0..=480.0).in_front(self.source.focus_path),
-            Pane::middle(Part::Plots, "Plots", 380.0),
+            Pane::middle(Part::Plots, "Plots", 380.0).at_least(540.0),
             Pane::right(Part::Result, "Result", 300.0, 250.0..=460.0),
         ];
         panes_ui(ui, "friction", &panes, |part, ui| match part {

@@ -74,7 +74,9 @@ impl MotionChart {
             ui.vertical(|ui| {
                 ui.set_width(0.4 * room.x);
                 self.over_speed_ui(vec2(0.4 * room.x, room.y - SUMMARY_HEIGHT), ui);
-                hint_ui(ui, self.summary());
+                hint_ui(ui, self.summary()).on_hover_text(
+                    "Line: means over rows of neighbouring speeds; band: from their first to their third quartile",
+                );
             });
         });
     }
@@ -137,7 +139,7 @@ impl MotionChart {
         let (low, high) = means
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), mean| (low.min(mean), high.max(mean)));
         let span = shown(high - low, 3);
-        format!("line: means, band: quartiles; means from peak to peak {span} {}", self.unit)
+        format!("means from peak to peak: {span} {}", self.unit)
     }
 }
 

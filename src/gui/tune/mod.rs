@@ -123,7 +123,7 @@ impl TuneTab {
         }
         let weights = Pane::left(Part::Weights, "Weights and gains", 412.0, 400.0..=480.0)
             .in_front(self.weights.focus_first);
-        let plots = Pane::middle(Part::Plots, "Robot and prediction", 400.0);
+        let plots = Pane::middle(Part::Plots, "Robot and prediction", 400.0).at_least(540.0);
         panes_ui(ui, "tune", &[weights, plots, model], |part, ui| match part {
             Part::Weights => self.design_ui(context, ui),
             Part::Plots => self.plots_ui(context, ui),
