@@ -206,7 +206,7 @@ impl RunsTab {
                 self.table.ui(context, &self.ledger, &mut self.ticked, undo, ui);
             });
         let panes = [
-            Pane::middle(Part::Overlay, "Runs over each other", 390.0),
+            Pane::middle(Part::Overlay, "Runs over each other", 390.0).at_least(320.0),
             Pane::right(Part::Changes, "What changed", 440.0, 240.0..=640.0),
         ];
         panes_ui(ui, "runs", &panes, |part, ui| match part {
