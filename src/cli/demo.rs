@@ -55,7 +55,7 @@ fn print(out: &mut dyn Write, shown: &Demonstration) -> io::Result<()> {
     {
         writeln!(
             out,
-            "3. The residual of the model, {channel}, is {} {}; noise of the sensors alone would make it {}.",
+            "3. The residual of the model, {channel}, is {} {}, its noise floor {}.",
             number(error.value),
             error.unit,
             number(noise.value)

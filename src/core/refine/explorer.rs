@@ -23,7 +23,7 @@ pub struct Explorer {
     pub after: Vec<f64>,
     /// Unit of the channel.
     pub unit: &'static str,
-    /// What noise of the sensors alone makes of the residual, in `unit`.
+    /// Noise floor of the residual, in `unit`.
     pub noise_floor: f64,
     /// Order of the motor angle, amplitude before and amplitude after in `unit`; none on a linear axis.
     pub orders: Vec<[f64; 3]>,

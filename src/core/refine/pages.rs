@@ -235,7 +235,7 @@ fn errors(found: &Refinement) -> Table {
     };
     add("Residual", |errors| &errors.rmse);
     add("Residual by the torque or force itself", |errors| &errors.nrmse);
-    add("Noise of the sensors alone", |errors| &errors.noise_floor);
+    add("Noise floor of the residual", |errors| &errors.noise_floor);
     Table {
         caption: "Root mean squares on held-out rows".to_owned(),
         columns: vec![

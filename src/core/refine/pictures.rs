@@ -36,7 +36,7 @@ pub(super) fn in_time(explorer: &Explorer) -> Option<Chart> {
 }
 
 fn noise(explorer: &Explorer) -> Vec<Limit> {
-    let name = "noise of the sensors alone, one standard deviation";
+    let name = "noise floor of the residual, one standard deviation";
     [1.0, -1.0].map(|sign| Limit { name: name.to_owned(), y: sign * explorer.noise_floor }).into()
 }
 

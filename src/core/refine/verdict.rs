@@ -72,7 +72,8 @@ pub struct Prediction {
     pub rmse: Quantity,
     /// Root mean square of the motion itself over that time.
     pub motion: Quantity,
-    /// What noise of the sensors alone makes of the error.
+    /// Noise floor of the residual: from its own spectrum, of what is left where it is known, so that it is no lower with
+    /// worse rows. `residual` has that of the declared model on all rows, `refine` that of the refined one.
     pub noise_floor: Quantity,
     /// Whether the error tells anything: a machine that is unstable by itself grows noise of the readings at the start
     /// beyond the motion.

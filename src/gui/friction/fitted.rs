@@ -90,7 +90,11 @@ impl Fitted {
                     Target::Both => "Both motors have the fitted friction, the simulated robot too.",
                 });
             }
-            (fitted, Rig::Axis(axis)) => fitted.put_into_axis(&mut axis.parameters),
+            (fitted, Rig::Axis(axis)) => {
+                fitted.put_into_axis(&mut axis.parameters);
+                // Those of the friction of before.
+                axis.friction_told_from = None;
+            }
         }
         Ok("The axis has the fitted values.")
     }
@@ -145,5 +149,37 @@ fn above_0(key: &str, value: Option<f64>) -> Result<Option<f64>, String> {
             Err(format!("The fitted {key} must be a finite number above 0 for the model to take it."))
         }
         other => Ok(other),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use flqr_core::model_file::{AxisModel, Model};
+
+    /// The speeds that the friction of before came from are not those of the fit.
+    #[test]
+    fn a_fitted_curve_does_not_keep_the_speeds_of_another() {
+        let text = "name = \"shaft\"\n[axis]\nkind = \"rotary\"\ninertia_kg_m2 = 0.005\n[friction]\n\
+                    coulomb_nm = 0.03\nviscous_nm_s_rad = 0.0005\ntold_from_rad_s = [0.1, 10.5]\n";
+        let mut model = Model::from_toml(text, "shaft.toml").unwrap();
+        let told_from = |model: &Model| match &model.rig {
+            Rig::Axis(AxisModel { friction_told_from, .. }) => *friction_told_from,
+            Rig::Robot(_) => panic!("an axis was read"),
+        };
+        assert_eq!(told_from(&model), Some([0.1, 10.5]));
+        let parameters = StribeckParameters {
+            coulomb_nm: 0.04,
+            static_nm: 0.04,
+            viscous_nm_s_rad: 0.001,
+            stribeck_speed_rad_s: 1.0,
+            stribeck_exponent: 1.0,
+            offset_nm: 0.0,
+        };
+        let curve = Stribeck::new(parameters).unwrap();
+        let fitted = Fitted::Rotary { curve, inertia_kg_m2: None, gravity_torque_nm: None };
+        fitted.put_into(&mut model.rig, Target::Both).unwrap();
+        assert_eq!(told_from(&model), None);
+        assert!(!model.to_toml().contains("told_from"));
     }
 }

@@ -8,11 +8,11 @@ use crate::record::{HealthFinding, Log, Severity};
 use crate::refine::gain::Gain;
 use crate::refine::select::{Blocks, Member};
 use crate::refine::verdict::Carried;
+use crate::refine::whiten::Whitener;
 
 use super::rig::{Declared, Nuisance, direction, torque_between};
 use super::search::{Search, White};
 use super::trace::{Acting, Part, Rows, Trace};
-use crate::refine::whiten::Whitener;
 
 /// Zeros that are tried in a period of the finest wave.
 const TRIES: f64 = 24.0;
@@ -34,32 +34,51 @@ pub(super) fn zeros_rad(declared: &Declared, rows: &Rows) -> Vec<f64> {
     if turning.is_empty() || declared.is_linear() || declared.gravity != 0.0 {
         return Vec::new();
     }
-    (0..logs).map(|log| zero_of(declared, &turning, rows, log).unwrap_or(0.0)).collect()
+    let columns = Columns::new(declared, &turning, rows);
+    (0..logs).map(|log| zero_of(&turning, rows, &columns, log).unwrap_or(0.0)).collect()
 }
 
-fn zero_of(declared: &Declared, effects: &[&Effect], rows: &Rows, log: usize) -> Option<f64> {
+/// What a zero is looked for with, at the rows of all logs.
+struct Columns {
+    torque: Vec<f64>,
+    /// Acceleration, speed, direction and offset.
+    plain: [Vec<f64>; 4],
+    /// The terms of the effects.
+    terms: Vec<Vec<f64>>,
+}
+
+impl Columns {
+    fn new(declared: &Declared, effects: &[&Effect], rows: &Rows) -> Self {
+        let terms = effects.iter().flat_map(|effect| {
+            let shape = effect.values(Role::Shape);
+            let how = Acting::of(effect.kind(), MachineKind::Rotary, &shape);
+            let terms = effect.kind().terms(&declared.machine, &shape);
+            terms.into_iter().map(move |term| rows.column(|trace| trace.acts(&*term.law, how)))
+        });
+        Self {
+            torque: rows.column(torque_between),
+            plain: [
+                rows.column(Trace::second_difference),
+                rows.column(|trace| trace.speed.clone()),
+                rows.column(|trace| trace.speed.iter().map(|&speed| direction(speed)).collect()),
+                rows.column(|trace| vec![1.0; trace.position.len()]),
+            ],
+            terms: terms.collect(),
+        }
+    }
+}
+
+fn zero_of(effects: &[&Effect], rows: &Rows, columns: &Columns, log: usize) -> Option<f64> {
     let of = |part: Part| -> Vec<usize> {
         let own = |row: &usize| rows.traces[rows.rows[*row].trace].log == log && rows.rows[*row].part == part;
         (0..rows.rows.len()).filter(own).collect()
     };
     let chosen = [Part::Fit, Part::HeldOut].map(of).into_iter().find(|rows| rows.len() >= LEAST_ROWS)?;
-    let at = |column: Vec<f64>| -> Vec<f64> { chosen.iter().map(|&row| column[row]).collect() };
-    let mut columns = vec![
-        at(rows.column(Trace::second_difference)),
-        at(rows.column(|trace| trace.speed.clone())),
-        at(rows.column(|trace| trace.speed.iter().map(|&speed| direction(speed)).collect())),
-        at(rows.column(|trace| vec![1.0; trace.position.len()])),
-    ];
-    let base = columns.len();
-    for effect in effects {
-        let shape = effect.values(Role::Shape);
-        let how = Acting::of(effect.kind(), MachineKind::Rotary, &shape);
-        for term in effect.kind().terms(&declared.machine, &shape) {
-            columns.push(at(rows.column(|trace| trace.acts(&*term.law, how))));
-        }
-    }
-    let views: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
-    let blocks = Blocks::new(&views, &at(rows.column(torque_between)), &vec![0; chosen.len()]);
+    let at = |column: &Vec<f64>| -> Vec<f64> { chosen.iter().map(|&row| column[row]).collect() };
+    let base = columns.plain.len();
+    let own: Vec<Vec<f64>> = columns.plain.iter().chain(&columns.terms).map(at).collect();
+    let views: Vec<&[f64]> = own.iter().map(Vec::as_slice).collect();
+    let blocks = Blocks::new(&views, &at(&columns.torque), &vec![0; chosen.len()]);
     // In one direction alone, friction is one constant.
     let both = blocks.fit(&[0, 1, 2, 3].map(Member::free), 0.0).is_some();
     let members: Vec<Member> =

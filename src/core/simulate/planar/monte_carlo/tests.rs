@@ -1,9 +1,11 @@
 use super::*;
 use crate::control::ControllerKind;
+use crate::effects::{Effect, MachineKind};
 use crate::friction::{Stribeck, StribeckParameters};
 use crate::lqr;
 use crate::model_file::presets;
-use crate::robot::{Actuation, MotorLimits};
+use crate::robot::{Actuation, MotorLimits, SensorSettings};
+use crate::simulate::{Simulation, SimulationSettings};
 
 const ONE_THREAD: NonZeroUsize = NonZeroUsize::MIN;
 
@@ -107,4 +109,38 @@ fn what_cannot_run_is_refused_by_name() {
     trials[1].robot.parameters.body_mass_kg = -1.0;
     assert!(monte_carlo(&trials, 1.0, ONE_THREAD).unwrap_err().to_string().contains("body_mass_kg"));
     assert_eq!(monte_carlo(&[], 1.0, ONE_THREAD).unwrap(), []);
+}
+
+/// A tether and cogging, as many robots at once and by the simulation that has all of the robot.
+#[test]
+fn effects_of_the_model_act_as_they_do_in_the_whole_robot() {
+    let effect = |id: &str, parameters: &[(&str, f64)]| {
+        Effect::new(id, MachineKind::Robot, None, parameters.iter().copied()).unwrap()
+    };
+    let effects = [
+        effect("tether_spring", &[("stiffness_n_m", 12.0), ("pull_n", 2.0)]),
+        effect("mass_error", &[("mass_kg", 1.5)]),
+        effect("cogging", &[("order_1", 7.0), ("cos_1_nm", 0.05), ("sin_1_nm", 0.03)]),
+    ];
+    let plain = trials(3).remove(2);
+    for effect in effects {
+        let mut trial = plain.clone();
+        trial.robot.effects = vec![effect.clone()];
+        trial.robot.actuation.torque_noise_nm = 0.0;
+        trial.robot.sensors = SensorSettings { imu_rate_hz: 1000.0, ..SensorSettings::default().exact() };
+        let settings = SimulationSettings { initial: trial.initial, ..SimulationSettings::default() };
+        let mut whole = Simulation::new(&trial.robot, trial.controller.clone(), settings).unwrap();
+        let [found, without] = &monte_carlo(&[trial, plain.clone()], 3.0, ONE_THREAD).unwrap()[..] else {
+            unreachable!()
+        };
+        let mut running = RunningStatistics::new(3000);
+        for _ in 0..3000 {
+            running.push(&whole.state());
+            whole.step();
+        }
+        let expected = running.finish(false);
+        let apart = (found.statistics.x_m.std / expected.x_m.std - 1.0).abs();
+        assert!(apart < 0.02, "{}: {} for {}", effect.id(), found.statistics.x_m.std, expected.x_m.std);
+        assert_ne!(found.statistics, without.statistics, "{}", effect.id());
+    }
 }
