@@ -5,6 +5,7 @@ use std::sync::OnceLock;
 
 use crate::effects::{Action, Effect, EffectKind, Form, Law, Machine, Moment, Place, Term};
 use crate::model_file::RobotModel;
+use crate::refine::split::split_s;
 use crate::robot::Motor;
 
 use super::kernel::Kernel;
@@ -44,9 +45,6 @@ pub(super) struct Run {
     pub(super) rows: std::ops::Range<usize>,
 }
 
-/// Gap before the part of a log that is held out, s.
-const GAP_S: f64 = 0.5;
-
 impl<'a> Trace<'a> {
     /// The logs as they were read.
     pub(super) fn readings(&self) -> impl Iterator<Item = &Readings> {
@@ -60,14 +58,14 @@ impl<'a> Trace<'a> {
         let split = held_out.is_empty();
         let parts = |readings: &Readings, fit: bool| -> Vec<Part> {
             let count = kernel.count(readings.rows());
-            let first = (2.0 / 3.0 * readings.rows() as f64) as usize;
-            let gap = (GAP_S / readings.dt_s) as usize;
+            let row = |at_s: f64| (at_s / readings.dt_s).round() as usize;
+            let [end, begin] = split_s(readings.rows() as f64 * readings.dt_s).map(row);
             let part = |row: usize| {
                 let centre = kernel.centre(row);
                 match (fit, split) {
                     (false, _) => Part::HeldOut,
-                    (true, true) if centre >= first + gap => Part::HeldOut,
-                    (true, true) if centre >= first => Part::Gap,
+                    (true, true) if centre >= begin => Part::HeldOut,
+                    (true, true) if centre >= end => Part::Gap,
                     _ => Part::Fit,
                 }
             };
