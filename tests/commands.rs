@@ -107,6 +107,33 @@ fn experiments_that_are_offered_parse_and_run() {
     refusal(&["simulate", PAPER, "--scenario", "friction-sweep", "--controller", "pi", "--slope", "0.1"], 2);
 }
 
+/// What `refine` offers runs as it is printed, and its recording tells apart what the first log could not.
+#[test]
+fn the_next_experiment_tells_apart_what_the_log_could_not() {
+    let shaft = "name = \"shaft\"\n[axis]\nkind = \"rotary\"\ninertia_kg_m2 = 0.005\n[friction]\ncoulomb_nm = 0.03\n\
+                 viscous_nm_s_rad = 0.0005\n";
+    let cogging = "[[effects]]\nid = \"cogging\"\norder_1 = 14.0\ncos_1_nm = 0.006\nsin_1_nm = 0.004\n";
+    let [declared, truth] = [("even.toml", shaft), ("even_truth.toml", &format!("{shaft}{cogging}"))]
+        .map(|(name, text)| file(name, text));
+    let [log, refined, next] = ["even.csv", "even_refined.toml", "even_next.csv"].map(|name| file(name, ""));
+    let even = "--scenario speed-tracking --controller pi --target-speed 2 --seconds 20";
+    let even: Vec<&str> = even.split(' ').collect();
+    json(&[&["simulate", &declared, "--robot", &truth, "--log", &log][..], &even].concat());
+    let found = json(&["refine", &declared, &log, "--out", &refined]);
+    let rivals = |found: &Value| {
+        let effects = found["effects"].as_array().unwrap();
+        let cogging = effects.iter().find(|effect| effect["id"] == "cogging").unwrap();
+        cogging["ambiguous_with"].as_array().unwrap().len()
+    };
+    assert!(rivals(&found) > 0, "{found:#}");
+    let command = found["next_experiment"]["command"].as_str().unwrap();
+    let words: Vec<&str> =
+        command.split(' ').map(|word| if word == "next.csv" { &next } else { word }).collect();
+    assert_eq!((words[0], words[2]), ("flqr", refined.as_str()), "{command}");
+    json(&[&words[1..], &["--robot", &truth]].concat());
+    assert_eq!(rivals(&json(&["refine", &declared, &log, &next])), 0, "{command}");
+}
+
 /// A log that cannot answer is told so before any effect, and what is no log of the machine is refused.
 #[test]
 fn refine_and_residual_of_logs_that_cannot_answer() {

@@ -8,7 +8,7 @@ use crate::refine::select::{Blocks, Member};
 
 use super::dead;
 use super::rig::{Declared, Nuisance};
-use super::trace::{Part, Rows};
+use super::trace::{Part, Rows, Trace};
 
 /// Fewest rows in a second at which friction and harmonics of a motor's loop are seen.
 const SLOWEST_HZ: f64 = 45.0;
@@ -26,6 +26,9 @@ const UNITS: [f64; 5] = [57.296, 9.549, 10.0, 100.0, 1000.0];
 const INCOHERENT: f64 = 0.5;
 /// Share of rows at a limit above which an effort is cut off.
 const CUT_OFF: f64 = 0.1;
+/// Power of the effort that accelerates over that of what is left of the effort, from which on the effort drives the
+/// motion: at even speeds under noise that nobody logged at most 0.75, on logs that are driven 3 and more.
+const DRIVEN: f64 = 1.0;
 /// How many times beyond the speeds that friction was told from a log may go.
 const FASTER: f64 = 1.5;
 /// Share of the highest speed below which the lowest is next to rest.
@@ -104,6 +107,25 @@ pub(super) fn check<'a>(logs: impl IntoIterator<Item = &'a Log>, declared: &Decl
         }
     }
     found
+}
+
+/// Whether what accelerates the axis is more than what is left of the effort.
+pub(super) fn is_driven(rows: &Rows, inertia: f64, left: &[f64]) -> bool {
+    let acceleration = rows.column(Trace::second_difference);
+    let fitted = || (0..rows.rows.len()).filter(|&row| rows.rows[row].part == Part::Fit);
+    let driven: f64 = fitted().map(|row| (inertia * acceleration[row]).powi(2)).sum();
+    let rest: f64 = fitted().map(|row| left[row] * left[row]).sum();
+    driven > DRIVEN * rest
+}
+
+/// The note that errors of declared numbers and of the effort's own way are not told.
+pub(super) fn not_driven(declared: &Declared) -> HealthFinding {
+    let problem =
+        "the motion is so even that noise accelerates the axis as much as the logged effort does: errors \
+                   of declared numbers and of the effort's way to the axis are not looked for"
+            .to_owned();
+    let mend = "record efforts of many frequencies to have them told";
+    finding(Severity::Warning, declared.names().effort, problem, mend)
 }
 
 /// The finding that the motion does not tell the parameters apart.

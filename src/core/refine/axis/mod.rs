@@ -16,7 +16,7 @@ mod waves;
 
 use std::ops::ControlFlow;
 
-use crate::effects::{self, Effect, MachineKind, Role};
+use crate::effects::{self, Effect, MachineKind, Place, Role};
 use crate::identify::quantile::student_t_975;
 use crate::model_file::{Model, Rig};
 use crate::record::Log;
@@ -146,7 +146,19 @@ pub(super) fn refine(
     let white = White::new(&rows, &whitener, &nuisances, [&measured, &target], declared.inertia);
     let wanted: Vec<f64> = measured.iter().zip(&target).map(|(measured, left)| measured - left).collect();
     let scales = Scales::new(&rows, declared.inertia);
+    let both = [measured.as_slice(), &target];
+    let bare = carried::fitted(&rows, &declared.machine, &nuisances, both, &whitener, declared.inertia);
+    let Some(bare) = bare else {
+        data_health.push(health::inseparable(&declared));
+        return Ok(Refinement::unfit(model, data_health));
+    };
     let mut library = library(&declared.machine, &rows, &whitener, &scales, (&wanted, declared.inertia));
+    // Where the effort is not what drives the motion, noise that nobody logged does: it would be taken for an error of
+    // the inertia or of the effort.
+    if !health::is_driven(&rows, declared.inertia, &bare) {
+        library.retain(|candidate| !matches!(candidate.kind.place, Place::Actuator | Place::Parameter));
+        data_health.push(health::not_driven(&declared));
+    }
     // What is free already is no effect that the model lacks.
     library
         .retain(|candidate| !nuisances.iter().any(|known| known.free && known.effect == candidate.kind.id));

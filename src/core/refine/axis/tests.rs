@@ -9,6 +9,8 @@ use rand_chacha::ChaCha8Rng;
 use crate::model_file::Model;
 use crate::record::{ColumnMap, Log, ReadOptions, Severity, read_log};
 use crate::refine::{Options, Refinement, Verdict, refine, residual};
+use crate::robot::Motor;
+use crate::simulate::{self, ControllerChoice, Experiment, Scenario};
 
 fn refined(model: &str, logs: &[Log], held_out: &[Log], estimate: &[&str]) -> Refinement {
     let model = Model::from_toml(model, "model.toml").unwrap();
@@ -189,6 +191,23 @@ fn logs_that_cannot_answer_are_told_before_any_effect() {
                 found.data_health
             );
         }
+    }
+}
+
+/// At one speed nothing but noise accelerates a shaft, which looks like an error of its inertia or of the torque's way.
+#[test]
+fn even_motion_tells_of_cogging_and_not_of_the_inertia() {
+    let model = Model::from_toml(SHAFT, "shaft.toml").unwrap();
+    let cogging = "[[effects]]\nid = \"cogging\"\norder_1 = 14.0\ncos_1_nm = 0.006\nsin_1_nm = 0.004\n";
+    let robot = Model::from_toml(&format!("{SHAFT}{cogging}"), "shaft.toml").unwrap();
+    for target_speed_rad_s in [2.0, 5.0] {
+        let run = Experiment::new(Scenario::SpeedTracking, ControllerChoice::Pi);
+        let run = Experiment { seconds: 20.0, target_speed_rad_s, ..run };
+        let outcome = simulate::run(&run, &model, &robot, &mut |_| ControlFlow::Continue(())).unwrap();
+        let found = refined(SHAFT, &[outcome.log(Motor::Left)], &[], &[]);
+        assert_eq!(ids(&found), ["cogging"], "{target_speed_rad_s}");
+        assert_eq!(found.effects[0].effect.get("order_1"), Some(14.0));
+        assert!(found.data_health.iter().any(|finding| finding.problem.contains("motion is so even")));
     }
 }
 
