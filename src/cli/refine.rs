@@ -95,8 +95,8 @@ pub(crate) fn print(out: &mut dyn Write, found: &Refinement) -> io::Result<()> {
         let drop = carried.error_drop_percent;
         write!(out, "\n{}, declared: error lower by {drop:.1} % with it", carried.id)?;
         match carried.error_drop_ci95 {
-            [low, high] if low < high => writeln!(out, " ({low:.1} to {high:.1})")?,
-            _ => writeln!(out)?,
+            Some([low, high]) => writeln!(out, " ({low:.1} to {high:.1})")?,
+            None => writeln!(out)?,
         }
     }
     let lost = found.candidates.iter().filter(|tried| tried.fate != Fate::Added);

@@ -104,8 +104,8 @@ impl Effect {
         Self::new(kind.id, machine, motor, values)
     }
 
-    /// What it is where angles count from elsewhere: at an angle q as this one at q + `turn_rad`. The same for one that
-    /// does not return with every turn.
+    /// What it is on a shaft whose angles count from elsewhere: at an angle q as this one at q + `turn_rad`. The same for
+    /// one that does not return with every turn.
     #[must_use]
     pub fn turned(&self, turn_rad: f64) -> Self {
         let mut turned = self.clone();

@@ -36,9 +36,10 @@ pub struct Placement {
 }
 
 /// Weights with R and the correlations of `start` whose loop, as it runs, has its pole `from` at `to`, 1/s; a real
-/// pole stays real. No pole comes to lie further right than the rightmost of `start`, or than the imaginary axis. Of all that do, those next to `start` in the logarithms of Q's diagonal, about: Newton's method
+/// pole stays real. Of all that do, those next to `start` in the logarithms of Q's diagonal, about: Newton's method
 /// along the line from one to the other. Where the line leaves what diagonals of Q from 1e-6 to 1e8 can do, they are
-/// those of its last place.
+/// those of its last place. No pole comes to lie further right than the rightmost of `start`, or than the imaginary
+/// axis.
 pub fn weights_for_pole(
     model: &LinearModel,
     timing: &SampledLoop,

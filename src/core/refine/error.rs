@@ -43,8 +43,10 @@ pub enum RefineError {
         /// The log.
         file: String,
     },
-    /// No range of speeds.
-    #[error("no speed is from {low} to {high}: give the lowest first, as 0..9")]
+    /// Bounds that are no range of speeds.
+    #[error(
+        "no speed is from {low} to {high}: give two from 0 up, rad/s or m/s, the lower one first, as 0..9"
+    )]
     Speeds {
         /// Lowest, in the unit of the log.
         low: f64,

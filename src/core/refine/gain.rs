@@ -16,9 +16,9 @@ const SEED: u64 = 95;
 pub(super) struct Gain {
     /// On all held-out rows.
     pub(super) share: f64,
-    /// 95 % interval by drawing blocks of these rows anew, as an effect may act in a few places alone; of no width where
-    /// they are too few.
-    pub(super) ci95: [f64; 2],
+    /// 95 % interval by drawing blocks of these rows anew, as an effect may act in a few places alone; none where they
+    /// are too few.
+    pub(super) ci95: Option<[f64; 2]>,
 }
 
 impl Gain {
@@ -34,7 +34,7 @@ impl Gain {
         }
         let blocks = BLOCKS.min(squares.len() / LEAST_ROWS);
         if blocks < LEAST_BLOCKS {
-            return Some(Self { share: share(all), ci95: [share(all); 2] });
+            return Some(Self { share: share(all), ci95: None });
         }
         let edge = |n: usize| n * squares.len() / blocks;
         let sums: Vec<[f64; 2]> = (0..blocks).map(|n| sum(&squares[edge(n)..edge(n + 1)])).collect();
@@ -47,7 +47,7 @@ impl Gain {
         let mut shares: Vec<f64> = (0..DRAWS).map(|_| draw()).filter(|share| share.is_finite()).collect();
         shares.sort_by(f64::total_cmp);
         let at = |part: f64| shares.get((part * shares.len() as f64) as usize).copied().unwrap_or(f64::NAN);
-        Some(Self { share: share(all), ci95: [at(0.025), at(0.975)] })
+        Some(Self { share: share(all), ci95: Some([at(0.025), at(0.975)]) })
     }
 }
 
@@ -62,10 +62,13 @@ mod tests {
         let without = vec![2.0; rows];
         let held: Vec<bool> = (0..rows).map(|row| row >= 200).collect();
         let everywhere = Gain::new(&without, &vec![1.0; rows], &held).unwrap();
-        assert!((everywhere.share - 0.5).abs() < 1e-12 && (everywhere.ci95[0] - 0.5).abs() < 1e-9);
+        assert!((everywhere.share - 0.5).abs() < 1e-12 && (everywhere.ci95.unwrap()[0] - 0.5).abs() < 1e-9);
         let once: Vec<f64> = (0..rows).map(|row| if (600..650).contains(&row) { 0.5 } else { 2.0 }).collect();
         let once = Gain::new(&without, &once, &held).unwrap();
-        assert!(once.share > 0.02 && once.ci95[0] <= 0.0 && once.ci95[1] > once.share, "{once:?}");
+        let [low, high] = once.ci95.unwrap();
+        assert!(once.share > 0.02 && low <= 0.0 && high > once.share, "{once:?}");
+        let few = Gain::new(&without[..100], &[1.0; 100], &[true; 100]).unwrap();
+        assert!((few.share - 0.5).abs() < 1e-12 && few.ci95.is_none(), "{few:?}");
         assert_eq!(Gain::new(&without, &without, &vec![false; rows]), None);
     }
 }

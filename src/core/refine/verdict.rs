@@ -72,8 +72,7 @@ pub struct Prediction {
     pub rmse: Quantity,
     /// Root mean square of the motion itself over that time.
     pub motion: Quantity,
-    /// Noise floor of the residual: from its own spectrum, of what is left where it is known, so that it is no lower with
-    /// worse rows. `residual` has that of the declared model on all rows, `refine` that of the refined one.
+    /// What noise of the readings at the start and at the end makes of it.
     pub noise_floor: Quantity,
     /// Whether the error tells anything: a machine that is unstable by itself grows noise of the readings at the start
     /// beyond the motion.
@@ -85,7 +84,8 @@ pub struct Prediction {
 pub struct Errors {
     /// Root mean square of the equation error.
     pub rmse: Channels,
-    /// What noise of the sensors alone makes of it.
+    /// Noise floor of the residual: from its own spectrum, of what is left where it is known, so that it is no lower with
+    /// worse rows. `residual` has that of the declared model on all rows, `refine` that of the refined one.
     pub noise_floor: Channels,
     /// `rmse` by the root mean square of the torque or force itself.
     pub nrmse: Channels,
@@ -285,8 +285,9 @@ pub struct Carried {
     /// By how much the error on held-out rows is lower with it, the declared numbers estimated anew with it and without,
     /// in percent of the error without it.
     pub error_drop_percent: f64,
-    /// 95 % interval of that, by blocks of the held-out rows.
-    pub error_drop_ci95: [f64; 2],
+    /// 95 % interval of that, by blocks of the held-out rows; none where these are too few.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error_drop_ci95: Option<[f64; 2]>,
     /// Where each log's angle counts from, by the effect, rad; fitted logs first.
     pub zeros_rad: Vec<f64>,
 }

@@ -105,18 +105,7 @@ const CAUSES: [(&str, Change); 7] = [
 ];
 
 fn exact_sensors(robot: &mut RobotModel) {
-    let sensors = &mut robot.sensors;
-    sensors.encoder_bits = 0;
-    for part in [
-        &mut sensors.motor_speed_step_rad_s,
-        &mut sensors.motor_speed_noise_rad_s,
-        &mut sensors.pitch_step_rad,
-        &mut sensors.pitch_noise_rad,
-        &mut sensors.pitch_rate_step_rad_s,
-        &mut sensors.pitch_rate_noise_rad_s,
-    ] {
-        *part = 0.0;
-    }
+    robot.sensors = robot.sensors.exact();
 }
 
 fn ideal(robot: &mut RobotModel) {

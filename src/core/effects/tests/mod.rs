@@ -242,3 +242,26 @@ fn values_that_no_machine_has_are_refused_with_the_mend() {
 mod bench;
 mod feedforward;
 mod robot;
+
+#[test]
+fn an_effect_that_is_turned_is_the_same_at_angles_that_count_from_elsewhere() {
+    let rng = &mut ChaCha8Rng::seed_from_u64(8);
+    for (kind, on) in everywhere().filter(|(kind, on)| kind.series() && *on != MachineKind::Linear) {
+        let (shape, sizes) = drawn(kind, on, 3, rng);
+        let effect = Effect::estimated(kind, on, None, &shape, &sizes).unwrap();
+        for turn_rad in [-2.0, 0.0, 0.3] {
+            let moments = moments(50, rng);
+            let elsewhere =
+                |moment: &Moment| Moment { motor_angle_rad: moment.motor_angle_rad + turn_rad, ..*moment };
+            let shifted: Vec<Moment> = moments.iter().map(elsewhere).collect();
+            let mut turned = effect.turned(turn_rad).law(&machine(on));
+            let mut law = effect.law(&machine(on));
+            let size = sizes.iter().map(|size| size.abs()).sum::<f64>();
+            for (moment, shifted) in moments.iter().zip(&shifted) {
+                let off = turned.act(moment).plus(-1.0, &law.act(shifted));
+                // Orders up to 20,000 make much of the last digit of an angle.
+                assert!(off.motor_nm.abs() + off.friction_nm.abs() < 1e-8 * size, "{} {off:?}", kind.id);
+            }
+        }
+    }
+}

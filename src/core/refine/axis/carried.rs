@@ -116,7 +116,7 @@ pub(super) fn carried(
         Some(Carried {
             id: effect.id(),
             error_drop_percent: 100.0 * gain.share,
-            error_drop_ci95: gain.ci95.map(|share| 100.0 * share),
+            error_drop_ci95: gain.ci95.map(|ends| ends.map(|share| 100.0 * share)),
             zeros_rad: if effect.kind().series() { declared.zeros_rad.clone() } else { Vec::new() },
         })
     };
@@ -158,7 +158,9 @@ pub(super) fn findings(declared: &Declared, logs: &[&Log], carried: &[Carried]) 
         })
         .collect();
     found.dedup();
-    let worse = carried.iter().filter(|c| c.error_drop_ci95[1] < 0.0 && c.error_drop_percent < -HARM_PERCENT);
+    let worse = carried.iter().filter(|c| {
+        c.error_drop_ci95.is_some_and(|[_, high]| high < 0.0) && c.error_drop_percent < -HARM_PERCENT
+    });
     found.extend(worse.map(|carried| {
         let problem = format!(
             "the model's {} does not carry over to these logs: without it the error is lower by {:.1} %",

@@ -196,6 +196,8 @@ pub(super) fn refine(
     search.hold_untold();
     search.check_held_out();
     search.release_needed();
+    // Whatever these left that depends on each other.
+    search.settle();
     if search.picks.is_empty() {
         search.held.clear();
     }
@@ -458,7 +460,7 @@ fn found_effects(search: &Search<'_>, fit: &Fit, declared: &Declared) -> Vec<Fou
             ci95,
             units,
             error_drop_percent: gain.map_or(f64::NAN, |gain| 100.0 * gain.share),
-            error_drop_ci95: gain.map(|gain| gain.ci95.map(|share| 100.0 * share)),
+            error_drop_ci95: gain.and_then(|gain| gain.ci95).map(|ends| ends.map(|share| 100.0 * share)),
             ambiguous_with,
         });
     }

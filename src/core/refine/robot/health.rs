@@ -53,6 +53,16 @@ pub(super) fn check<'a>(
     found
 }
 
+/// The finding that the motion does not tell the declared numbers and the effects apart.
+pub(super) fn inseparable() -> HealthFinding {
+    finding(
+        Severity::Error,
+        "torque_left_nm",
+        "the log does not tell declared numbers and effects apart".to_owned(),
+        "drive to and fro, with tones of torque on top",
+    )
+}
+
 fn finding(severity: Severity, column: &str, problem: String, mend: &str) -> HealthFinding {
     HealthFinding { severity, column: column.to_owned(), problem, mend: mend.to_owned() }
 }
@@ -114,7 +124,10 @@ fn compared(column: &str, (slope, correlation): (f64, f64), of: &str) -> Option<
     let problem = if correlation < -0.7 {
         format!("runs against {of}: its sign is wrong")
     } else if correlation.abs() < 0.5 {
-        format!("does not follow {of} (correlation {correlation:.2}): a dead or mistaken sensor")
+        let problem =
+            format!("does not follow {of} (correlation {correlation:.2}): a dead or mistaken sensor");
+        let mend = "check both sensors and their columns, and record anew";
+        return Some(finding(Severity::Error, column, problem, mend));
     } else if slope.abs() > 1.33 || slope.abs() / correlation.powi(2) < 0.75 {
         // Noise of the other column flattens the slope, by no more than the correlation says.
         format!("is {slope:.3} times what {of} says: its unit is wrong")

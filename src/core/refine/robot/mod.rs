@@ -155,8 +155,14 @@ pub(super) fn refine(
     let known = Known { tolerances: &model.tolerance, estimate: &options.estimate };
     let mut channels = Channels::new(&trace, &trace.residual());
     let chance = std::sync::OnceLock::new();
-    for pass in 0..2 {
-        report(watch, 0.1 + 0.45 * f64::from(pass))?;
+    let unfit = |mut data_health: Vec<HealthFinding>| {
+        data_health.push(health::inseparable());
+        Ok(Refinement::unfit(model, data_health))
+    };
+    let mut is_last = false;
+    loop {
+        let done = if is_last { 0.55 } else { 0.1 };
+        report(watch, done)?;
         let target = trace.residual();
         let (mut free, mut tried) = (nuisances(&trace, known), library(&trace, THREADS));
         whitened(&mut tried, &mut free, &channels, THREADS);
@@ -164,21 +170,21 @@ pub(super) fn refine(
             || *chance.get_or_init(|| by_chance(&trace, &channels, &free, &target, (known, options.seed)));
         let mut search = Search::new(&trace, &channels, &free, &tried, &target, &by_chance);
         search.threads = THREADS;
-        search.run(&mut |share| report(watch, 0.1 + 0.45 * f64::from(pass) + 0.4 * share))?;
+        search.run(&mut |share| report(watch, done + 0.4 * share))?;
         search.settle();
-        if pass == 1 {
+        if is_last {
             search.simplify();
             search.merge_pushes();
             search.confirm();
             search.polish();
         }
-        let Some(fit) = search.fit(&search.picks) else { return Ok(Refinement::unfit(model, data_health)) };
+        let Some(fit) = search.fit(&search.picks) else { return unfit(data_health) };
         if search.picks.is_empty() {
             return Ok(answer(model, &search, (&fit, &fit), bias, data_health));
         }
-        if pass == 1 {
+        if is_last {
             let Some((fit, sized)) = sure(&mut search, known, options.seed) else {
-                return Ok(Refinement::unfit(model, data_health));
+                return unfit(data_health);
             };
             return Ok(answer(model, &search, (&fit, &sized), bias, data_health));
         }
@@ -186,8 +192,8 @@ pub(super) fn refine(
         let loads = trace.loads(&found::laws(&search, &fit));
         channels = Channels::new(&trace, &left);
         trace.refill(&loads);
+        is_last = true;
     }
-    Ok(Refinement::unfit(model, data_health))
 }
 
 /// A clean robot that stands in for the recorded one, with its noise; none where it cannot be simulated.

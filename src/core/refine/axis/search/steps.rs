@@ -331,14 +331,16 @@ impl Search<'_> {
     }
 
     /// Takes out picks without which the held-out rows are told as well, the most doubtful first: the interval of what
-    /// each gains there must not hold 0.
+    /// each gains there must not hold 0; where there are too few rows for an interval, the gain itself counts.
     pub(in super::super) fn check_held_out(&mut self) -> Option<()> {
         let held_out: Vec<bool> = self.rows.rows.iter().map(|row| row.part == Part::HeldOut).collect();
         while !self.picks.is_empty() {
             let with = self.residual(&self.fit(&[])?.judged.coefficients);
+            // Without rows that were held out nothing is sure.
             let least = |out: usize| {
-                let gain = Gain::new(&self.residual_without(&[out])?, &with, &held_out)?;
-                Some((gain.ci95[0], out))
+                let without = self.residual_without(&[out])?;
+                let sure = |gain: Gain| gain.ci95.map_or(gain.share, |[low, _]| low);
+                Some((Gain::new(&without, &with, &held_out).map_or(0.0, sure), out))
             };
             let weakest = (0..self.picks.len()).filter_map(least).min_by(|a, b| a.0.total_cmp(&b.0))?;
             if weakest.0 > 0.0 {
