@@ -23,12 +23,14 @@ pub(super) const STYLE: &str = include_str!("chart.css");
 /// Widths and heights of pictures, px.
 const SMALLEST: f64 = 200.0;
 const LARGEST: f64 = 10_000.0;
+/// Room at the left and right of a picture that stands alone, px; a page has its own.
+pub(super) const MARGIN: f64 = 10.0;
 /// A panel is at least this high, px.
 const LEAST_PANEL: f64 = 40.0;
-const LINE_HEIGHT: f64 = 18.0;
+pub(super) const LINE_HEIGHT: f64 = 18.0;
 /// Width of a character, px; generous, so that texts keep clear of each other in most fonts.
-const CHARACTER: f64 = 7.2;
-const RIGHT: f64 = 22.0;
+pub(super) const CHARACTER: f64 = 7.2;
+pub(super) const RIGHT: f64 = 22.0;
 const SWATCH: f64 = 26.0;
 /// Least distance of horizontal grid lines, px.
 const Y_SPACING: f64 = 28.0;
@@ -41,7 +43,7 @@ const TINTS: usize = 3;
 pub(super) fn picture(chart: &Chart, [width, height]: [f64; 2]) -> String {
     let mut markup = Markup::with_looks(Looks::of_sheet(STYLE));
     let width = if width.is_finite() { width.clamp(SMALLEST, LARGEST) } else { WIDE };
-    let mut layout = Layout::new(chart, width);
+    let mut layout = Layout::new(chart, width - 2.0 * MARGIN);
     if height.is_finite() {
         layout.stretch(chart, height.min(LARGEST));
     }
@@ -55,7 +57,7 @@ pub(super) fn draw(chart: &Chart, width: f64, name: &str, id: &str, markup: &mut
 }
 
 fn draw_layout(chart: &Chart, layout: &Layout, name: &str, id: &str, alone: bool, markup: &mut Markup) {
-    let width = layout.width;
+    let width = if alone { layout.width + 2.0 * MARGIN } else { layout.width };
     let [title, description] = ["title", "text"].map(|part| format!("{id}-{part}"));
     let names = format!("{title} {description}");
     let [wide, high] = [Px(width), Px(layout.height)];
@@ -75,13 +77,20 @@ fn draw_layout(chart: &Chart, layout: &Layout, name: &str, id: &str, alone: bool
         markup.text_element("desc", &[("id", &description)], &chart.description);
         if alone {
             markup.leaf("rect", &[("width", &wide), ("height", &high), ("fill", &"#ffffff")]);
+            let moved = format!("translate({})", Px(MARGIN));
+            markup.element("g", &[("transform", &moved)], |markup| content(chart, layout, id, markup));
+        } else {
+            content(chart, layout, id, markup);
         }
-        layout.legend(markup);
-        for (number, (panel, place)) in chart.panels.iter().zip(&layout.panels).enumerate() {
-            layout.panel(panel, place, &format!("{id}-frame-{number}"), markup);
-        }
-        layout.x_axis(chart, markup);
     });
+}
+
+fn content(chart: &Chart, layout: &Layout, id: &str, markup: &mut Markup) {
+    layout.legend(markup);
+    for (number, (panel, place)) in chart.panels.iter().zip(&layout.panels).enumerate() {
+        layout.panel(panel, place, &format!("{id}-frame-{number}"), markup);
+    }
+    layout.x_axis(chart, markup);
 }
 
 struct Layout {

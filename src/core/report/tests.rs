@@ -183,6 +183,11 @@ fn a_picture_needs_no_style_sheet() {
     let root = &all[0].1;
     assert_eq!([&root["width"], &root["height"], &root["font-size"]], ["640", "480", "13px"]);
     assert_eq!([&root["fill"], &root["viewBox"]], ["#1c2126", "0 0 640 480"]);
+    // Words begin inside the picture also where its font is wider than the one that was reckoned with.
+    assert!(
+        all.iter()
+            .any(|(name, has)| name == "g" && has.get("transform").is_some_and(|by| by == "translate(10)"))
+    );
     let is_colour = |value: &String| value.len() == 7 && value.starts_with('#');
     // A picture in a picture is not drawn by every program.
     assert_eq!(all.iter().filter(|(name, _)| name == "svg").count(), 1);
@@ -268,10 +273,20 @@ fn marks_are_where_the_values_are() {
         Axis { range: Some([0.0, 1.0]), ..Axis::new("y", "m") },
         vec![Series::new("line", Mark::Line, [[0.0, 0.0], [10.0, 1.0]])],
     );
-    let svg = chart.to_svg();
-    // One series needs no legend: the axis title has the first 18 px after a margin of 4, the plot begins 6 px below
-    // and is 300 px tall; left of it are labels of three characters, 7.2 px each, and 12 px.
-    assert!(svg.contains("d=\"M33.6 328l824.4-300\""), "{svg}");
+    // One series needs no legend: below a margin of 4 is the axis title's line, 6 px below that the plot, 300 px tall;
+    // left of it are labels of three characters and 12 px.
+    let left = 3.0 * svg::CHARACTER + 12.0;
+    let low = 4.0 + svg::LINE_HEIGHT + 6.0 + 300.0;
+    let picture = chart.to_svg();
+    let page = Document { title: String::new(), summary: String::new(), blocks: vec![Block::Figure(chart)] }
+        .to_html();
+    // A page has margins of its own, a picture has them inside.
+    for (markup, margin) in [(picture, svg::MARGIN), (page, 0.0)] {
+        let wide = svg::WIDE - 2.0 * margin - svg::RIGHT - left;
+        let line = format!("d=\"M{left:.1} {low}l{wide:.1}-300\"");
+        let (before, _) = markup.split_once(&line).unwrap_or_else(|| panic!("{line} is not in {markup}"));
+        assert_eq!(before.contains(&format!("translate({margin})")), margin > 0.0);
+    }
 }
 
 #[test]

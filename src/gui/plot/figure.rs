@@ -3,6 +3,8 @@
 use egui_plot::PlotPoint;
 use flqr_core::report::{Axis, Chart, Limit, Mark, Panel, Series};
 
+use crate::widgets::plain;
+
 /// Columns that a figure is drawn of: two points each.
 pub(super) const COLUMNS: usize = 2000;
 
@@ -52,9 +54,10 @@ pub(super) fn chart(
     let of: String = sources.iter().map(|source| format!(" Of {source}.")).collect();
     let mut x = Axis::new(title, unit);
     x.range = Some(range);
+    let [from, to] = range.map(|end| plain(end, 6));
     Chart {
         title: format!("{name}: {}", shown.join("; ")),
-        description: format!("{} from {} to {} {unit}.{of}", shown.join("; "), range[0], range[1]),
+        description: format!("{} from {from} to {to} {unit}.{of}", shown.join("; ")),
         x,
         panels,
     }
