@@ -125,6 +125,8 @@ fn read(path: &Path) -> Option<String> {
     Some(String::from_utf8_lossy(&std::fs::read(path).ok()?).into_owned())
 }
 
+type Writing = Job<(), Result<(), String>>;
+
 /// The slot of this window.
 pub(crate) struct Store {
     folder: PathBuf,
@@ -133,7 +135,9 @@ pub(crate) struct Store {
     _lock: File,
     written: Option<Document>,
     looked: Option<Instant>,
-    job: Option<Job<(), Result<(), String>>>,
+    job: Option<Writing>,
+    /// Why the last write could not even begin.
+    not_begun: Option<String>,
     failed: bool,
     /// What the session has taken over, removed once that is on the disk.
     taken: Vec<Left>,
@@ -150,6 +154,7 @@ impl Store {
             written: None,
             looked: None,
             job: None,
+            not_begun: None,
             failed: false,
             taken: Vec::new(),
             in_job: Vec::new(),
@@ -184,19 +189,36 @@ impl Store {
                 )
             })
         };
-        if let Ok(job) = Job::start("keep-session", waker, write) {
-            self.job = Some(job);
-            self.written = Some(document);
-            self.in_job.append(&mut self.taken);
+        self.begun(Job::start("keep-session", waker, write), document);
+        if self.not_begun.is_some() {
+            waker();
+        }
+    }
+
+    fn begun(&mut self, job: std::io::Result<Writing>, document: Document) {
+        match job {
+            Ok(job) => {
+                self.job = Some(job);
+                self.written = Some(document);
+                self.in_job.append(&mut self.taken);
+            }
+            Err(error) => {
+                self.not_begun = Some(format!(
+                    "The session could not be kept: no thread to write it ({error}). Close other programs."
+                ));
+            }
         }
     }
 
     /// What to say of the last write: why it failed, once, or that it is well again.
     pub(crate) fn drain(&mut self) -> Option<Result<String, String>> {
-        let result = match self.job.as_mut()?.poll().1 {
-            Outcome::Running => return None,
-            Outcome::Done(result) => result,
-            Outcome::Broken => Err("Keeping the session failed: this is a defect of flqr.".to_owned()),
+        let result = match self.not_begun.take() {
+            Some(problem) => Err(problem),
+            None => match self.job.as_mut()?.poll().1 {
+                Outcome::Running => return None,
+                Outcome::Done(result) => result,
+                Outcome::Broken => Err("Keeping the session failed: this is a defect of flqr.".to_owned()),
+            },
         };
         self.job = None;
         let failed_before = std::mem::replace(&mut self.failed, result.is_err());
@@ -365,5 +387,21 @@ mod tests {
         assert_eq!(keep(store, "two"), None, "said once");
         std::fs::remove_dir_all(&store.path).unwrap();
         assert_eq!(keep(store, "two"), Some(Ok("The session is kept again.".to_owned())));
+    }
+
+    #[test]
+    fn a_write_that_cannot_begin_is_said_once() {
+        let folder = Folder::new("threads");
+        let mut opened = open(&folder.0);
+        let store = opened.store.as_mut().unwrap();
+        let mut refuse = || {
+            store.begun(Err(std::io::ErrorKind::WouldBlock.into()), Document::default());
+            store.drain()
+        };
+        assert!(refuse().unwrap().unwrap_err().contains("no thread"));
+        assert_eq!(refuse(), None, "said once");
+        // The document that was refused is not taken for written.
+        assert_eq!(keep(store, "one"), Some(Ok("The session is kept again.".to_owned())));
+        assert_eq!(kept(&std::fs::read_to_string(&store.path).unwrap()), "one");
     }
 }

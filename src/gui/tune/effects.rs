@@ -25,13 +25,14 @@ pub(super) fn ui(context: &ViewContext<'_>, ui: &mut Ui) {
         for (index, effect) in effects.iter().enumerate() {
             match effect_ui(index, effect, ui) {
                 None => {}
-                Some(Change::Feedforward(fed)) => {
-                    let mut all = effects.clone();
-                    if let Ok(other) = effect.clone().with_feedforward(fed) {
+                Some(Change::Feedforward(fed)) => match effect.clone().with_feedforward(fed) {
+                    Ok(other) => {
+                        let mut all = effects.clone();
                         all[index] = other;
+                        changed = Some(all);
                     }
-                    changed = Some(all);
-                }
+                    Err(problem) => context.commands.send(Command::Say(format!("Not taken: {problem}."))),
+                },
                 Some(Change::Remove) => {
                     let mut all = effects.clone();
                     all.remove(index);
