@@ -20,6 +20,7 @@ fail() {
     [ -s "$state" ] && cat "$state" >&2
     [ -s "$scratch/stderr" ] && cat "$scratch/stderr" >&2
     import -window root "$out/failed.png" 2>/dev/null || true
+    echo "${0##*/}: what there is up to here is in $out" >&2
     exit 1
 }
 

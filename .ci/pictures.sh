@@ -84,7 +84,8 @@ both refine
 xdotool key ctrl+6
 until_state 20 "the page of runs is there" '.tab == "runs"'
 if [ "$zoom" = 0 ]; then
-    # The boxes of the second and the third row: both runs of the experiment, below the refinement.
+    # The boxes of the second and the third row: both runs of the experiment, below the refinement. At their places, as
+    # no key and no command ticks a row: where the table has moved, this fails below, with a picture of it.
     for y in 151 176; do
         # Below the window's title, 20 pixels at any scale.
         xdotool mousemove $((20 * scale)) $((20 + (y - 20) * scale))
