@@ -2,6 +2,11 @@
 
 use crate::history::Channel;
 
+/// Names of a robot's states, in the order of its matrices.
+pub(crate) const STATES: [&str; 4] = ["displacement", "velocity", "pitch", "pitch rate"];
+/// Names of its motors, as above.
+pub(crate) const MOTORS: [&str; 2] = ["left", "right"];
+
 /// How a quantity is shown.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Quantity {

@@ -8,6 +8,7 @@ use flqr_core::model_file::Change;
 use crate::design::Comparison;
 use crate::experiments::Settings;
 use crate::layout::Node;
+use crate::quantity::STATES;
 use crate::session::Session;
 
 /// The oldest steps go first.
@@ -209,10 +210,9 @@ pub(crate) fn words(key: &str) -> String {
 
 /// An entry of a full weight matrix, `lqr.q[1][3]`.
 fn entry_words(key: &str) -> Option<String> {
-    const Q: &[&str] = &["displacement", "velocity", "pitch", "pitch rate"];
     const R: &[&str] = &["left torque", "right torque"];
     let (names, place) = match key.strip_prefix("lqr.q[") {
-        Some(place) => (Q, place),
+        Some(place) => (&STATES[..], place),
         None => (R, key.strip_prefix("lqr.r[")?),
     };
     let (row, column) = place.strip_suffix(']')?.split_once("][")?;

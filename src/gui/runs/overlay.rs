@@ -123,8 +123,12 @@ impl Drawn<'_> {
     }
 
     fn signal(&self) -> Signal<'_> {
-        Signal { time_s: &self.series.time_s, values: &self.series.channels[self.channel].values }
+        signal(self.series, self.channel)
     }
+}
+
+fn signal(series: &Series, channel: usize) -> Signal<'_> {
+    Signal { time_s: &series.time_s, values: &series.channels[channel].values }
 }
 
 /// Why a row from before cannot be ticked.
@@ -230,20 +234,12 @@ impl Overlay {
         let start_s =
             drawn.first().and_then(|row| self.shifts_s.get(&row.run.number)).copied().unwrap_or(0.0);
         let work = move |_: &_| {
-            let signal = |(_, series, channel): &(u64, Arc<Series>, usize)| (Arc::clone(series), *channel);
-            let (fixed, fixed_channel) = signal(&rows[0]);
-            let of = |series: &'_ Series, channel: usize| -> (Vec<f64>, Vec<f64>) {
-                (series.time_s.clone(), series.channels[channel].values.clone())
-            };
-            let (fixed_s, fixed_values) = of(&fixed, fixed_channel);
-            let mut found = vec![(rows[0].0, Some(start_s))];
-            for row in &rows[1..] {
-                let fixed = Signal { time_s: &fixed_s, values: &fixed_values };
-                let moved = Signal { time_s: &row.1.time_s, values: &row.1.channels[row.2].values };
-                let best = best_alignment(fixed, moved).map(|best| best.shift_s + start_s);
-                found.push((row.0, best));
-            }
-            found
+            let mut signals =
+                rows.iter().map(|(number, series, channel)| (*number, signal(series, *channel)));
+            let Some((first, fixed)) = signals.next() else { return Vec::new() };
+            let best = |moved| best_alignment(fixed, moved).map(|best| best.shift_s + start_s);
+            let others = signals.map(|(number, moved)| (number, best(moved)));
+            std::iter::once((first, Some(start_s))).chain(others).collect()
         };
         match Job::start("align-runs", &waker, work) {
             Ok(job) => self.job = Some(job),

@@ -5,6 +5,7 @@ use egui::{CollapsingHeader, Grid, RichText, Ui};
 use crate::command::Command;
 use crate::context::ViewContext;
 use crate::design::{Designed, Slot};
+use crate::quantity::{MOTORS, STATES};
 use crate::theme::palette;
 use crate::widgets::{change, hint_ui, mono, section_ui, shown};
 
@@ -95,8 +96,6 @@ fn differences(a: &Designed, b: &Designed, peaks: [f64; 2]) -> Vec<Difference> {
             all.push(Difference { name, a, b });
         }
     };
-    const STATES: [&str; 4] = ["displacement", "velocity", "pitch", "pitch rate"];
-    const MOTORS: [&str; 2] = ["left", "right"];
     for (row, state) in STATES.into_iter().enumerate() {
         for (column, other) in STATES.into_iter().enumerate().skip(row) {
             let name = if row == column { format!("Q {state}") } else { format!("Q {state}, {other}") };

@@ -4,10 +4,8 @@ use egui::Ui;
 use flqr_core::lqr::Weights;
 use nalgebra::SMatrix;
 
+use crate::quantity::{MOTORS, STATES};
 use crate::widgets::{hint_ui, number_ui};
-
-const STATES: [&str; 4] = ["displacement", "velocity", "pitch", "pitch rate"];
-const MOTORS: [&str; 2] = ["left", "right"];
 
 /// Edits both matrices; they stay symmetric by construction.
 pub(super) fn matrices_ui(ui: &mut Ui, weights: &mut Weights) {

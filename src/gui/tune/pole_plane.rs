@@ -10,6 +10,7 @@ use super::margins::complex;
 use super::predicted::quiet_plot;
 use crate::command::Command;
 use crate::context::ViewContext;
+use crate::quantity::STATES;
 use crate::theme::palette;
 use crate::widgets::{choice_ui, shown, warning_ui};
 
@@ -64,15 +65,14 @@ const SPENT: f64 = 1e-3;
 
 /// What to say where a drag leaves next to nothing of a weight that was there.
 fn spent(before: &Weights, now: &Weights) -> Option<String> {
-    const NAMES: [&str; 4] = ["displacement", "velocity", "pitch", "pitch rate"];
     let is_spent = |index: &usize| {
         let (before, now) = (before.q[(*index, *index)], now.q[(*index, *index)]);
         before > 0.0 && now < SPENT * before
     };
-    let gone: Vec<usize> = (0..NAMES.len()).filter(is_spent).collect();
+    let gone: Vec<usize> = (0..STATES.len()).filter(is_spent).collect();
     let weight = |index: &usize| {
         let [before, now] = [before, now].map(|weights| shown(weights.q[(*index, *index)], 3));
-        format!("{} weight {before} → {now}", NAMES[*index])
+        format!("{} weight {before} → {now}", STATES[*index])
     };
     let listed = gone.iter().map(weight).collect::<Vec<_>>().join(", ");
     let meaning = if gone.contains(&0) { ": the robot hardly returns to its place" } else { "" };

@@ -6,6 +6,7 @@ use flqr_core::lqr::Weights;
 use super::matrices::matrices_ui;
 use crate::command::Command;
 use crate::context::ViewContext;
+use crate::quantity::STATES;
 use crate::widgets::{choice_ui, hint_ui, number_ui, section_ui};
 
 /// What one weight is about.
@@ -24,10 +25,10 @@ const LARGEST: f64 = 1e4;
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
 const Q_ROWS: [Row; 4] = [
-    Row { name: "displacement", unit: "m", unit_si: 1.0, help: "Q₁₁, 1/m²" },
-    Row { name: "velocity", unit: "m/s", unit_si: 1.0, help: "Q₂₂, s²/m²" },
-    Row { name: "pitch", unit: "°", unit_si: DEGREE, help: "Q₃₃, 1/rad²" },
-    Row { name: "pitch rate", unit: "°/s", unit_si: DEGREE, help: "Q₄₄, s²/rad²" },
+    Row { name: STATES[0], unit: "m", unit_si: 1.0, help: "Q₁₁, 1/m²" },
+    Row { name: STATES[1], unit: "m/s", unit_si: 1.0, help: "Q₂₂, s²/m²" },
+    Row { name: STATES[2], unit: "°", unit_si: DEGREE, help: "Q₃₃, 1/rad²" },
+    Row { name: STATES[3], unit: "°/s", unit_si: DEGREE, help: "Q₄₄, s²/rad²" },
 ];
 
 const R_ROWS: [Row; 2] = [

@@ -51,9 +51,10 @@ impl Stack {
             }
         }
         ui.separator();
-        for panel in
-            panels.iter().filter(|panel| self.chosen.get(&*panel.name).copied().unwrap_or(panel.shown))
-        {
+        for panel in panels {
+            if !self.is_shown(panel) {
+                continue;
+            }
             ui.menu_button(format!("Second axis of {}", panel.name), |ui| {
                 second_axis_ui(ui, &mut self.second, panel, panels);
             });
