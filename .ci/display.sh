@@ -7,11 +7,13 @@ scratch=$(mktemp -d)
 started=()
 
 cleanup() {
+    local status=$?
     for ((i = ${#started[@]} - 1; i >= 0; i--)); do
         kill "${started[i]}" 2>/dev/null || true
         wait "${started[i]}" 2>/dev/null || true
     done
     rm -rf "$scratch"
+    [ "$status" = 0 ] || echo "${0##*/}: what there is up to here is in $out" >&2
 }
 trap cleanup EXIT
 
@@ -20,7 +22,6 @@ fail() {
     [ -s "$state" ] && cat "$state" >&2
     [ -s "$scratch/stderr" ] && cat "$scratch/stderr" >&2
     import -window root "$out/failed.png" 2>/dev/null || true
-    echo "${0##*/}: what there is up to here is in $out" >&2
     exit 1
 }
 
