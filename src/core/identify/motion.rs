@@ -225,6 +225,16 @@ pub enum MotionError {
         /// Column of the position.
         column: &'static str,
     },
+    /// Torque or force that does not change.
+    #[error(
+        "{file}: column `{column}` does not change, and tells nothing of mass and friction: record what really acts"
+    )]
+    NoEffort {
+        /// The log.
+        file: String,
+        /// Column of the torque or force.
+        column: &'static str,
+    },
     /// Too few rows are left.
     #[error(
         "{files}: {rows} rows in motion are left after filtering at {cutoff_hz:.3} Hz and {needed} are needed, \

@@ -238,7 +238,7 @@ fn files_that_are_no_logs_are_refused_with_place_and_mend() {
             "run.csv:1: the first row holds numbers where the names of the columns belong",
         ),
         (
-            "\u{1f}\u{8b}\u{8}zipped".into(),
+            "\u{1f}\u{8b}\u{8}zipped\rinside".into(),
             "run.csv:1 is not CSV text (it has bytes of a binary or compressed",
         ),
         (

@@ -204,10 +204,10 @@ fn delimiter(header: &[u8]) -> u8 {
 fn not_text(text: &[u8]) -> Option<&'static str> {
     if text.starts_with(b"\xff\xfe") || text.starts_with(b"\xfe\xff") {
         Some("it is UTF-16 text")
+    } else if text.iter().any(|&byte| byte < b' ' && !b"\t\n\r".contains(&byte)) {
+        Some("it has bytes of a binary or compressed format")
     } else if text.contains(&b'\r') {
         Some("its lines end in bare carriage returns")
-    } else if text.iter().any(|&byte| byte < b' ' && byte != b'\t' && byte != b'\n') {
-        Some("it has bytes of a binary or compressed format")
     } else {
         None
     }

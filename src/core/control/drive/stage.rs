@@ -81,7 +81,10 @@ pub enum StopReason {
     #[error("the experiment is done")]
     Done,
     /// No reading of the IMU.
-    #[error("the IMU has been silent for {silent_s:.3} s: look at its cable, rate and baud rate")]
+    #[error(
+        "the IMU has been silent for {silent_s:.3} s: look at its cable, rate and baud rate, or at what else keeps this \
+         computer busy"
+    )]
     ImuSilent {
         /// For how long, s.
         silent_s: f64,
@@ -93,7 +96,10 @@ pub enum StopReason {
         frozen_s: f64,
     },
     /// No reply of a motor.
-    #[error("the {motor} motor has been silent for {silent_s:.3} s: look at its cable, supply and id")]
+    #[error(
+        "the {motor} motor has been silent for {silent_s:.3} s: look at its cable, supply and id, or at what else keeps \
+         this computer busy"
+    )]
     MotorSilent {
         /// Which.
         motor: Motor,

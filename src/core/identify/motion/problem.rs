@@ -101,6 +101,10 @@ impl Problem {
         if !stretches.is_empty() && !stretches.iter().any(moves) {
             return Err(MotionError::NoMotion { file: log.source.clone(), column: position_name });
         }
+        let pushes = |stretch: &Stretch| stretch.effort.windows(2).any(|pair| pair[0] != pair[1]);
+        if !stretches.is_empty() && !stretches.iter().any(pushes) {
+            return Err(MotionError::NoEffort { file: log.source.clone(), column: effort_name });
+        }
         let sieve = Sieve::choose(&stretches);
         let motions: Vec<_> = stretches.iter().map(|stretch| sieve.kinematics(stretch)).collect();
         let speeds = motions.iter().flat_map(|motion| &motion.speed);

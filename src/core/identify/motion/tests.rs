@@ -397,13 +397,15 @@ fn logs_that_cannot_be_fitted_say_why() {
     let short = [
         ("time_s", vec![0.0, 0.1, 0.2, 0.3, 0.4]),
         ("motor_angle_rad", vec![0.0, 1.0, 2.0, 1.0, 0.0]),
-        ("torque_nm", vec![0.0; 5]),
+        ("torque_nm", vec![0.0, 0.1, 0.0, -0.1, 0.0]),
     ];
+    let idle = [short[0].clone(), short[1].clone(), still[2].clone()];
     let part = [("time_s", vec![0.0, 0.1]), ("torque_nm", vec![0.0; 2])];
     let empty: [(&str, Vec<f64>); 3] =
         [("time_s", vec![]), ("motor_angle_rad", vec![]), ("torque_nm", vec![])];
     for (log, estimate, expected) in [
         (Log::from_columns("a.csv", still), "all", "a.csv: column `motor_angle_rad` does not change, record"),
+        (Log::from_columns("f.csv", idle), "all", "f.csv: column `torque_nm` does not change, and tells"),
         (
             Log::from_columns("b.csv", short),
             "all",

@@ -94,7 +94,7 @@ pub(super) fn check<'a>(logs: impl IntoIterator<Item = &'a Log>, declared: &Decl
         let effort = dead::effort(positions, efforts).filter(|_| declared.gravity == 0.0);
         found.extend(effort.map(|rows| dead(names.effort, rows, "the motion")));
         let share = share_at_limits(efforts);
-        if share > CUT_OFF {
+        if share > CUT_OFF && share < 1.0 {
             found.push(finding(
                 Severity::Error,
                 names.effort,
@@ -291,6 +291,10 @@ pub(super) fn check_effort(
     };
     let left = blocks.left(&members, &found);
     let factor = found[0];
+    // Of no effort there is no factor.
+    if factor == 0.0 {
+        return Vec::new();
+    }
     // Of the effort, what the known part explains and what nothing does.
     let explained = factor * factor * own;
     let gear = rows

@@ -61,7 +61,8 @@ impl Dependence {
         };
         Test {
             name: format!("share explained by {name}"),
-            value: self.gain,
+            // What makes left-out blocks worse explains nothing.
+            value: self.gain.max(0.0),
             threshold: STRUCTURE,
             structure: self.shows(),
         }

@@ -19,13 +19,13 @@ use std::ops::ControlFlow;
 use crate::effects::{self, Effect, MachineKind, Place, Role};
 use crate::identify::quantile::student_t_975;
 use crate::model_file::{Model, Rig};
-use crate::record::Log;
+use crate::record::{Log, Severity};
 use crate::robot::Motor;
 
 use super::error::RefineError;
 use super::gain::Gain;
 use super::select::Blocks;
-use super::verdict::{Corrected, Found, Refinement, Residual, Unexplained, Verdict};
+use super::verdict::{Corrected, Errors, Found, Refinement, Residual, Unexplained, Verdict};
 use super::whiten::Whitener;
 use super::{Explorer, Options};
 use candidates::{Scales, library};
@@ -74,6 +74,10 @@ pub(super) fn residual(
     let mut data_health = health::check(logs, &declared);
     // No number is fitted, so that every row counts.
     let rows = Rows::new(logs, logs, declared.names(), Asked::new(options.speeds));
+    data_health.extend(health::check_rows(&rows, &declared, rows.rows.len(), LEAST_ROWS));
+    if data_health.iter().any(|finding| finding.severity == Severity::Error) {
+        return Ok(Residual { errors: Errors::default(), tests: Vec::new(), data_health });
+    }
     declared.zeros_rad = carried::zeros_rad(&declared, &rows);
     let [measured, mut target] = declared.targets(&rows);
     let nuisances = declared.nuisances(&rows, &options.estimate)?;

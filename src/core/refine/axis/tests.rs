@@ -8,6 +8,7 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::model_file::Model;
 use crate::record::{ColumnMap, Log, ReadOptions, Severity, read_log};
+use crate::refine::verdict::Channels;
 use crate::refine::{Options, Refinement, Verdict, refine, residual};
 use crate::robot::Motor;
 use crate::simulate::{self, ControllerChoice, Experiment, Scenario};
@@ -182,8 +183,15 @@ fn logs_that_cannot_answer_are_told_before_any_effect() {
             (SHAFT, bad.clone(), column),
             (RAIL, on_rail(&bad), RAIL_NAMES.iter().find(|(name, _)| *name == column).unwrap().1),
         ] {
-            let found = refined(model, &[bad], &[], &[]);
+            let found = refined(model, std::slice::from_ref(&bad), &[], &[]);
             assert_eq!((found.verdict, ids(&found)), (Verdict::DataUnfit, vec![]), "{what}");
+            let mends = found.data_health.iter().map(|finding| finding.mend.as_str());
+            assert!(mends.clone().all(|mend| !mend.contains("inf") && !mend.contains("NaN")), "{what}");
+            let model = Model::from_toml(model, "model.toml").unwrap();
+            let watch = &mut |_| ControlFlow::Continue(());
+            let far = residual(&model, &[bad], &Options::default(), watch).unwrap();
+            let is_finite = |channels: &Channels| channels.0.iter().all(|(_, value)| value.value.is_finite());
+            assert!(is_finite(&far.errors.nrmse) && is_finite(&far.errors.rmse), "{what}: {:?}", far.errors);
             let mut errors = found.data_health.iter().filter(|finding| finding.severity == Severity::Error);
             assert!(
                 errors.any(|finding| finding.column == column && finding.problem.contains(told)),
