@@ -3,8 +3,8 @@
 //! `cargo bench -p flqr-core --bench undeclared -- [family…] [--first ROUND] [--rounds N] [--noise FACTOR]
 //! [--seconds LENGTH] [--alone] [--verbose]`;
 //! families: clean, tolerance, single, quarter, pairs, outside, the same of a motor on a bench behind `bench-` (`bench`
-//! for all of those), the id of an effect, or the generator's name of one. Rounds 0 to 29 are those that were looked at
-//! while the method was made; figures are told from round 30 on. `--seconds` makes logs of that length without another
+//! for all of those), the id of an effect, or the generator's name of one. Rounds 0 to 29 are for
+//! work on the method; figures are told from later ones. `--seconds` makes logs of that length without another
 //! log beside them, so that the last third is held out; `--alone` judges one case at a time, which is what its time is
 //! to be measured with.
 
