@@ -10,10 +10,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use egui::{Context, Ui};
+use egui::{Context, Event, Ui};
 use flqr_core::control::ControllerKind;
 use flqr_core::control::drive::Stage;
-use flqr_core::device::{Event, EventKind};
+use flqr_core::device::{Event as DeviceEvent, EventKind};
 use flqr_core::model_file::Model;
 
 use crate::column_map::ColumnMapForm;
@@ -222,6 +222,7 @@ impl App {
 
     /// Applies what views asked for, and takes in what threads have brought. Draws nothing.
     pub fn logic(&mut self, ctx: &Context) {
+        self.release_status(ctx);
         self.drain_live();
         self.drain_link();
         self.drain_jobs();
@@ -336,7 +337,7 @@ impl App {
             self.robot.note(update);
         }
         // A recording that could not be started, for instance: said where it is seen from every page.
-        let warning = |event: &&Event| event.kind == EventKind::Warning;
+        let warning = |event: &&DeviceEvent| event.kind == EventKind::Warning;
         let mut warnings = updates.iter().flat_map(|update| &update.events).filter(warning);
         if let Some(warning) = warnings.next_back() {
             self.fail(sentence(&warning.text));
@@ -479,6 +480,17 @@ impl App {
         self.messages.add(Severity::Error, text);
     }
 
+    /// What has to be seen stays in the status line until a key or button is pressed; an answer to a question is
+    /// a part of what it is about.
+    fn release_status(&mut self, ctx: &Context) {
+        let is_press = |event: &Event| {
+            matches!(event, Event::Key { pressed: true, .. } | Event::PointerButton { pressed: true, .. })
+        };
+        if self.question.is_none() && ctx.input(|input| input.events.iter().any(is_press)) {
+            self.messages.release();
+        }
+    }
+
     /// The running robot gets new gains; the first gains of a model start it.
     fn follow_design(&mut self) {
         let started = self.designer.in_force.is_some();
@@ -580,7 +592,8 @@ impl App {
             "experiments_tab": self.experiments.snapshot(),
             "runs_tab": self.runs.snapshot(),
             "robot_tab": self.robot.snapshot(&self.link),
-            "message": self.messages.newest().map(|message| &message.text),
+            "message": self.messages.status().map(|(_, text)| text),
+            "message_severity": self.messages.status().map(|(severity, _)| severity.word()),
         })
     }
 }

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use flqr_core::record::{
-    ColumnMap, HealthFinding, Log, LogKind, ReadOptions, data_health, read_log, row_time_s,
+    ColumnMap, HealthFinding, Log, LogKind, ReadOptions, Severity, data_health, read_log, row_time_s,
 };
 
 use crate::job::{Job, Outcome, Reporter, Waker};
@@ -96,7 +96,8 @@ impl Loader {
     }
 
     /// The log of before stays until another one is complete.
-    pub(crate) fn drain(&mut self) -> Option<String> {
+    /// `place` is where the health of a log is seen.
+    pub(crate) fn drain(&mut self, place: &str) -> Option<String> {
         let (progress, outcome) = self.job.as_mut()?.poll();
         self.progress = progress.last().copied().or(self.progress);
         let result = match outcome {
@@ -109,7 +110,7 @@ impl Loader {
         self.progress = None;
         Some(match result {
             Ok(loaded) => {
-                let text = format!("{} rows loaded from {}.", loaded.log.rows(), loaded.path.display());
+                let text = loaded.sentence(place);
                 self.log = Some(loaded);
                 text
             }
@@ -198,6 +199,18 @@ impl LoadedLog {
     /// Horizontal values for the preview, as many as rows.
     pub(crate) fn axis_values(&self) -> &[f64] {
         self.axis.rows.as_deref().or_else(|| self.log.column("time_s")).unwrap_or_default()
+    }
+
+    /// That it is loaded, and how much is wrong with it.
+    fn sentence(&self, place: &str) -> String {
+        let (rows, path) = (self.log.rows(), self.path.display());
+        match self.health.iter().filter(|finding| finding.severity > Severity::Info).count() {
+            0 => format!("{rows} rows loaded from {path}."),
+            1 => format!("{rows} rows loaded with 1 health finding: see {place}. They are from {path}."),
+            count => {
+                format!("{rows} rows loaded with {count} health findings: see {place}. They are from {path}.")
+            }
+        }
     }
 
     /// Kind and size, in a line.

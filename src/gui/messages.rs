@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use egui::{
     Align, CentralPanel, Color32, Frame, Layout, Margin, Rect, RichText, ScrollArea, TextEdit, TextStyle, Ui,
-    UiBuilder, vec2,
+    UiBuilder, Visuals, vec2,
 };
 
 use crate::theme::palette;
@@ -20,14 +20,25 @@ const TIME_WIDTH: f32 = 96.0;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Severity {
     Note,
+    Warning,
     Error,
 }
 
 impl Severity {
-    fn word(self) -> &'static str {
+    pub(crate) fn word(self) -> &'static str {
         match self {
             Self::Note => "note",
+            Self::Warning => "warning",
             Self::Error => "error",
+        }
+    }
+
+    /// The colour of its text.
+    pub(crate) fn color(self, visuals: &Visuals) -> Color32 {
+        match self {
+            Self::Note => visuals.text_color(),
+            Self::Warning => palette(visuals).warning,
+            Self::Error => palette(visuals).error,
         }
     }
 }
@@ -75,13 +86,21 @@ impl Message {
 pub(crate) struct Messages {
     start: Instant,
     all: VecDeque<Message>,
+    /// What the status line says until the user does something, whatever is said meanwhile.
+    standing: Option<String>,
     filter: String,
     only_errors: bool,
 }
 
 impl Default for Messages {
     fn default() -> Self {
-        Self { start: Instant::now(), all: VecDeque::new(), filter: String::new(), only_errors: false }
+        Self {
+            start: Instant::now(),
+            all: VecDeque::new(),
+            standing: None,
+            filter: String::new(),
+            only_errors: false,
+        }
     }
 }
 
@@ -104,15 +123,27 @@ impl Messages {
         }
     }
 
+    /// Adds a warning that the status line keeps until `release`.
+    pub(crate) fn stand(&mut self, text: String) {
+        self.add(Severity::Warning, text.clone());
+        self.standing = Some(text);
+    }
+
+    /// The user has done something: what stood in the status line has been in view.
+    pub(crate) fn release(&mut self) {
+        self.standing = None;
+    }
+
     /// What the status line says.
-    pub(crate) fn newest(&self) -> Option<&Message> {
-        self.all.back()
+    pub(crate) fn status(&self) -> Option<(Severity, &str)> {
+        let newest = || self.all.back().map(|message| (message.severity, &*message.text));
+        self.standing.as_deref().map(|text| (Severity::Warning, text)).or_else(newest)
     }
 
     fn shown(&self) -> Vec<&Message> {
         let filter = self.filter.trim().to_lowercase();
         let fits = |message: &&Message| {
-            (!self.only_errors || message.severity == Severity::Error)
+            (!self.only_errors || message.severity != Severity::Note)
                 && (filter.is_empty() || message.text.to_lowercase().contains(&filter))
         };
         self.all.iter().filter(fits).collect()
@@ -132,7 +163,7 @@ impl Messages {
         ui.horizontal_wrapped(|ui| {
             let filter = TextEdit::singleline(&mut self.filter).hint_text("filter").desired_width(180.0);
             ui.add(filter).accessible_name("message filter").on_hover_text("Messages with these letters");
-            ui.checkbox(&mut self.only_errors, "Errors only");
+            ui.checkbox(&mut self.only_errors, "Errors only").on_hover_text("And warnings");
             let shown = self.shown();
             let copy = ui.add_enabled(!shown.is_empty(), egui::Button::new("Copy messages"));
             if copy.on_hover_text("Copy what is shown, as text").clicked() {
@@ -189,11 +220,7 @@ fn row_ui(message: &Message, ui: &mut Ui) {
         ui.set_width(TIME_WIDTH);
         ui.label(time).on_hover_text("Time since the start");
     });
-    let text = RichText::new(message.text());
-    let text = match message.severity {
-        Severity::Error => text.color(palette(ui.visuals()).error),
-        Severity::Note => text,
-    };
+    let text = RichText::new(message.text()).color(message.severity.color(ui.visuals()));
     ui.add(egui::Label::new(text).wrap().selectable(true));
 }
 
@@ -213,9 +240,20 @@ mod tests {
             messages.add(Severity::Note, number.to_string());
         }
         assert_eq!(messages.all.len(), LONGEST);
-        assert_eq!(messages.newest().map(|m| m.text.as_str()), Some("5999"));
+        assert_eq!(messages.status(), Some((Severity::Note, "5999")));
         messages.filter = "599".to_owned();
         // 4599, 5599 and 5990 to 5999: the 599th is gone.
         assert_eq!(messages.shown().len(), 12);
+    }
+
+    #[test]
+    fn what_stands_in_the_status_line_stays_until_it_is_released() {
+        let mut messages = Messages::default();
+        messages.stand("lost".to_owned());
+        messages.add(Severity::Note, "back");
+        messages.add(Severity::Error, "no");
+        assert_eq!(messages.status(), Some((Severity::Warning, "lost")));
+        messages.release();
+        assert_eq!(messages.status(), Some((Severity::Error, "no")));
     }
 }

@@ -57,6 +57,12 @@ pub(crate) fn palette(visuals: &Visuals) -> Palette {
     if visuals.dark_mode { DARK } else { LIGHT }
 }
 
+/// Gives boxes to tick an edge, so that they are seen while they are empty.
+pub(crate) fn outline_boxes(visuals: &mut Visuals) {
+    visuals.widgets.inactive.bg_stroke = Stroke::new(1.0, palette(visuals).reference);
+    visuals.widgets.inactive.bg_fill = visuals.extreme_bg_color;
+}
+
 /// Gives both themes their look.
 pub(crate) fn apply(ctx: &Context) {
     ctx.set_fonts(fonts());
@@ -133,4 +139,30 @@ fn rounded(mut visuals: Visuals) -> Visuals {
     }
     visuals.slider_trailing_fill = true;
     visuals
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Contrast of two colours as WCAG 2 defines it.
+    fn contrast(colors: [Color32; 2]) -> f32 {
+        let luminance = |color: Color32| {
+            let [red, green, blue, _] = egui::Rgba::from(color).to_array();
+            0.2126 * red + 0.7152 * green + 0.0722 * blue
+        };
+        let [a, b] = colors.map(luminance);
+        (a.max(b) + 0.05) / (a.min(b) + 0.05)
+    }
+
+    #[test]
+    fn an_empty_box_is_seen_in_both_themes() {
+        for mut visuals in [dark(), light()] {
+            outline_boxes(&mut visuals);
+            let edge = visuals.widgets.inactive.bg_stroke.color;
+            for behind in [visuals.panel_fill, visuals.faint_bg_color, visuals.extreme_bg_color] {
+                assert!(contrast([edge, behind]) >= 3.0, "{edge:?} on {behind:?}");
+            }
+        }
+    }
 }

@@ -456,7 +456,9 @@ impl App {
             None => {}
             Some(ModelJob::Load(path, mut job)) => match job.poll().1 {
                 Outcome::Running => self.model_job = Some(ModelJob::Load(path, job)),
-                Outcome::Done(Ok(model)) if self.session != self.saved && !self.link.is_hot() => {
+                Outcome::Done(Ok(model))
+                    if self.session != self.saved && model != self.session.model() && !self.link.is_hot() =>
+                {
                     self.ask_replacement(Replacement::Model(Box::new(model), path));
                 }
                 Outcome::Done(Ok(model)) => drop(self.open_model(model, Some(path))),

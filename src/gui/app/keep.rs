@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use egui::{Context, Theme, ViewportCommand};
+use flqr_core::model_file::Model;
 
 use super::questions::{Question, Replacement};
 use super::{App, Saved};
@@ -229,8 +230,9 @@ impl App {
         for (path, held_out) in document.refine_logs.iter().flatten().cloned() {
             self.commands.send(Command::Refine(RefineCommand::Load { path, held_out }));
         }
-        for problem in self.take_surroundings(document, ctx) {
-            self.fail(format!("{name}: {problem}."));
+        let unused = self.take_surroundings(document, ctx);
+        if !unused.is_empty() {
+            self.messages.stand(format!("Not all of the session of {name} was used: {}.", unused.join("; ")));
         }
         if let Some(tab) = document.tab {
             self.commands.send(Command::SelectTab(tab));
@@ -239,14 +241,20 @@ impl App {
         true
     }
 
-    /// Says what of a session file was not read, if anything.
+    /// Says what of a session file was not read, if anything; it stays in view until the user does something.
     pub(super) fn say_unread(&mut self, path: &Path, problems: &[String]) {
-        if !problems.is_empty() {
-            self.fail(format!(
-                "Of the session file {} not all was read: {}. The file is kept as it is.",
-                path.display(),
-                problems.join("; ")
-            ));
+        let path = path.display();
+        match problems {
+            [] => {}
+            [only] if only == document::NO_SESSION => {
+                self.messages.stand(format!("{path} is no session file of flqr; it is kept as it is."));
+            }
+            _ => {
+                let problems = problems.join("; ");
+                self.messages.stand(format!(
+                    "Not all of the session was read: {problems}. The file {path} is kept as it is."
+                ));
+            }
         }
     }
 
@@ -406,7 +414,8 @@ impl App {
 
     /// Takes over a session, after a question where changes of the model or runs would be replaced.
     fn offer_session(&mut self, document: Document, path: PathBuf, ctx: &Context) {
-        let loses_model = document.model.is_some() && self.session != self.saved;
+        let is_other = |model: &Model| *model != self.session.model();
+        let loses_model = document.model.as_ref().is_some_and(is_other) && self.session != self.saved;
         let loses_runs = document.runs.as_ref().is_some_and(|runs| self.runs.ledger().missing_in(runs) > 0);
         if (loses_model || loses_runs) && !self.link.is_hot() {
             self.ask_replacement(Replacement::Session(Box::new(document), path));

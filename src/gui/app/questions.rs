@@ -13,6 +13,7 @@ use super::{App, apply};
 use crate::command::{Command, FilePurpose};
 use crate::document::{Document, Left, words};
 use crate::recent::Recent;
+use crate::refine::RefineFile;
 use crate::robot::{STOP_HEIGHT, stop_ui};
 use crate::widgets::{hint_ui, mono, warning_ui};
 
@@ -228,6 +229,7 @@ impl App {
                 }
             }
             Answer::StartAfresh => {
+                self.messages.release();
                 if let Question::Restore { left, .. } = question {
                     self.say(format!("The session of before stays in {}.", left.put_aside().display()));
                 }
@@ -283,7 +285,8 @@ impl App {
         let (Replacement::Model(_, path) | Replacement::Session(_, path)) = by;
         ui.heading(format!("Open {}?", path.display()));
         let mut losses = Vec::new();
-        if self.session != self.saved {
+        let is_other = by.model().is_some_and(|model| *model != self.session.model());
+        if is_other && self.session != self.saved {
             losses.push(format!("“{}” has changes that are in no file.", self.session.name));
         }
         let runs = match by {
@@ -413,6 +416,9 @@ fn overwrite_ui(path: &Path, what: &str, save: &Command, ui: &mut Ui) -> Reply {
 
 /// Old and new values, key by key.
 fn changes_ui(changes: &[Change], heads: [&str; 2], ui: &mut Ui) {
+    if changes.is_empty() {
+        return;
+    }
     let value = |value: &Option<String>| value.clone().unwrap_or_else(|| "–".to_owned());
     ScrollArea::vertical().max_height(LONGEST_TABLE).show(ui, |ui| {
         Grid::new("changes").num_columns(3).striped(true).spacing([24.0, 3.0]).show(ui, |ui| {
@@ -513,7 +519,8 @@ fn title(purpose: FilePurpose) -> &'static str {
     match purpose {
         FilePurpose::OpenModel => "Open a model",
         FilePurpose::SaveModel => "Save the model as",
-        FilePurpose::OpenLog | FilePurpose::Refine(_) => "Open a log",
+        FilePurpose::OpenLog | FilePurpose::Refine(RefineFile::Log) => "Open a log",
+        FilePurpose::Refine(RefineFile::Save(saved_as)) => saved_as.title(),
         FilePurpose::OpenReplay => "Open a recording to replay",
         FilePurpose::OpenSession => "Open a session",
         FilePurpose::SaveSession => "Save the session as",
@@ -526,7 +533,7 @@ fn title(purpose: FilePurpose) -> &'static str {
 fn recent_of(purpose: FilePurpose, recent: &Recent) -> &[PathBuf] {
     match purpose {
         FilePurpose::OpenModel => &recent.models,
-        FilePurpose::OpenLog | FilePurpose::Refine(_) => &recent.logs,
+        FilePurpose::OpenLog | FilePurpose::Refine(RefineFile::Log) => &recent.logs,
         FilePurpose::OpenReplay => &recent.recordings,
         FilePurpose::OpenSession => &recent.sessions,
         _ => &[],

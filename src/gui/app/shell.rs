@@ -8,7 +8,6 @@ use super::App;
 use crate::command::{Command, Source};
 use crate::commands::{self, STOP_KEYS, keys_ui, menu_ui};
 use crate::layout::Side;
-use crate::messages::Severity;
 use crate::robot::bar_ui;
 use crate::tab::Tab;
 use crate::theme::palette;
@@ -191,13 +190,10 @@ impl App {
         ui.horizontal(|ui| {
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                 self.numbers_ui(ui);
-                let Some(message) = self.messages.newest() else { return };
-                let color = match message.severity {
-                    Severity::Error => palette(ui.visuals()).error,
-                    Severity::Note => ui.visuals().text_color(),
-                };
+                let Some((severity, text)) = self.messages.status() else { return };
+                let color = severity.color(ui.visuals());
                 ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
-                    let text = RichText::new(&message.text).small().color(color);
+                    let text = RichText::new(text).small().color(color);
                     ui.add(egui::Label::new(text).truncate());
                 });
             });

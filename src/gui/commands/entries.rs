@@ -8,9 +8,10 @@ use flqr_core::device::SessionOrder;
 use flqr_core::model_file::presets;
 
 use super::{Entry, Menu, Sent, Situation};
-use crate::command::{Command, FilePurpose, Source};
+use crate::command::{Command, FilePurpose, Source, Target};
 use crate::layout::Side;
-use crate::refine::{Question, RefineCommand, RefineFile};
+use crate::plot::{FigureFile, FigureKind};
+use crate::refine::{Question, RefineCommand, RefineFile, SavedAs};
 use crate::tab::Tab;
 
 const fn ctrl(key: Key) -> KeyboardShortcut {
@@ -148,6 +149,42 @@ fn file() -> Vec<Entry> {
             dialog(FilePurpose::SaveSession),
         )
         .also("project workspace layout"),
+        entry(
+            menu,
+            "export-csv",
+            "Export the plots of this page as CSV…",
+            "The samples of the visible range",
+            &[],
+            |s| export(s, FigureKind::Csv),
+        )
+        .also("save data samples"),
+        entry(
+            menu,
+            "export-figure",
+            "Export the plots of this page as a figure…",
+            "The visible range as SVG, or as PNG",
+            &[],
+            |s| export(s, FigureKind::Svg),
+        )
+        .also("save picture plot svg png"),
+        entry(
+            menu,
+            "save-report",
+            "Save the report of the search…",
+            "What the Refine page has found, as HTML",
+            &[],
+            dialog(FilePurpose::Refine(RefineFile::Save(SavedAs::Report))),
+        )
+        .also("refine export html"),
+        entry(
+            menu,
+            "save-refined",
+            "Save the refined model…",
+            "The model with the effects that are ticked on the Refine page, as TOML",
+            &[],
+            dialog(FilePurpose::Refine(RefineFile::Save(SavedAs::Model))),
+        )
+        .also("refine export toml"),
         entry(
             menu,
             "quit",
@@ -343,7 +380,8 @@ fn run() -> Vec<Entry> {
                 Tab::Robot => Ok(connect(s)),
             },
         ),
-        entry(menu, "fit", "Start or cancel the fit", "Friction from the loaded log", &[], start_fit),
+        entry(menu, "fit", "Start or cancel the fit", "Friction from the loaded log", &[], start_fit)
+            .also("friction identify"),
         entry(
             menu,
             "refine",
@@ -352,6 +390,42 @@ fn run() -> Vec<Entry> {
             &[],
             |s| Ok(start_refine(s)),
         ),
+        entry(
+            menu,
+            "find-missing",
+            "Find what is missing",
+            "Look for effects that the model lacks, in the logs of the Refine page",
+            &[],
+            |s| ask(s, Question::Refine),
+        )
+        .also("refine search effects attribution"),
+        entry(
+            menu,
+            "residual",
+            "How far is the model?",
+            "The residual of the logs of the Refine page alone, without a search",
+            &[],
+            |s| ask(s, Question::Residual),
+        )
+        .also("refine residual error"),
+        entry(
+            menu,
+            "use-found",
+            "Use in the model what was found",
+            "The effects that are ticked on the Refine page, and the corrected numbers",
+            &[],
+            |_| Ok(Command::Refine(RefineCommand::Use)),
+        )
+        .also("refine add effects"),
+        entry(
+            menu,
+            "use-fit",
+            "Use the fit for both motors",
+            "The friction that the Friction page has fitted",
+            &[],
+            |s| if s.has_log { Ok(Command::UseFit(Target::Both)) } else { Err("there is no log") },
+        )
+        .also("friction add model"),
         entry(
             menu,
             "demo",
@@ -415,6 +489,24 @@ fn start_fit(s: &Situation<'_>) -> Sent {
         (_, true) => Ok(Command::StartFit),
         _ => Err("there is no log"),
     }
+}
+
+fn ask(s: &Situation<'_>, question: Question) -> Sent {
+    if s.refine_runs { Err("a search runs") } else { Ok(Command::Refine(RefineCommand::Start(question))) }
+}
+
+/// Opens the form that saves the plots of the page.
+fn export(s: &Situation<'_>, kind: FigureKind) -> Sent {
+    let stack = match s.tab {
+        Tab::Tune if s.has_robot => "live",
+        Tab::Friction if s.has_log => "log",
+        Tab::Experiments => "runs",
+        Tab::Runs => "overlay",
+        Tab::Refine => return Err("“Export” is above the plot of the Residual step"),
+        Tab::Tune | Tab::Friction | Tab::Robot | Tab::Log => return Err("this page has no plots now"),
+    };
+    let asks = "Type the path to save to, or browse.".to_owned();
+    Ok(Command::ChooseFigure(FigureFile { stack, kind }, Err(asks)))
 }
 
 fn start_refine(s: &Situation<'_>) -> Command {

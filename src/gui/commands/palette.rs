@@ -160,7 +160,11 @@ mod tests {
             ("friction", "tab-friction"),
             ("split", "right-tune"),
             ("tiles", "reset-layout"),
-            ("csv", "open-log"),
+            ("csv", "export-csv"),
+            ("import", "open-log"),
+            ("export", "export-csv"),
+            ("how far", "residual"),
+            ("report", "save-report"),
             ("exit", "quit"),
         ] {
             assert_eq!(first(filter), id, "{filter}");
@@ -170,6 +174,17 @@ mod tests {
                 matches!(ALL[*index].group, Some("Tiles")) || ALL[*index].id == "reset-layout"
             };
             assert!(found(filter).iter().take(10).all(layout), "{filter}");
+        }
+        for (filter, ids) in [
+            ("refine", &["find-missing", "residual", "use-found", "save-report"][..]),
+            ("export", &["export-csv", "export-figure", "save-report"]),
+            ("add", &["use-found"]),
+        ] {
+            let found: Vec<_> = found(filter).into_iter().map(|index| &*ALL[index].id).collect();
+            assert!(
+                ids.iter().all(|id| found.iter().take(12).any(|found| found == id)),
+                "{filter}: {found:?}"
+            );
         }
         assert!(found("zzzzq").is_empty());
         assert_eq!(found("").len(), ALL.len());

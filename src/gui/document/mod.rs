@@ -24,6 +24,8 @@ pub(crate) use undo::{Base, Content, Undo, words};
 
 const FORMAT: &str = "flqr-session";
 const VERSION: u64 = 1;
+/// What is said of a file that is none.
+pub(crate) const NO_SESSION: &str = "it is no session file of flqr";
 /// Ending of the files.
 pub(crate) const EXTENSION: &str = "flqr-session";
 /// A session file larger than this is none.
@@ -120,7 +122,7 @@ impl Document {
         let part =
             |name: &str| parts.iter().find(|(key, _)| key == name).and_then(|(_, value)| value.as_ref());
         if part("format").and_then(Value::as_str) != Some(FORMAT) {
-            problems.push("it is no session file of flqr".to_owned());
+            problems.push(NO_SESSION.to_owned());
             return (document, problems);
         }
         match part("version").and_then(Value::as_u64) {
@@ -128,6 +130,7 @@ impl Document {
             Some(version) if version > VERSION => problems.push(format!(
                 "it is of a newer flqr (version {version} of the format, known is {VERSION}): what is known of it is used"
             )),
+            None if cut => {}
             _ => problems.push("its version cannot be read".to_owned()),
         }
         for (key, value) in &parts {
@@ -142,7 +145,7 @@ impl Document {
             }
         }
         if cut {
-            problems.push("it ends early".to_owned());
+            problems.push(ends_early(&parts));
         }
         (document, problems)
     }
@@ -202,6 +205,18 @@ impl Document {
     }
 }
 
+/// That a file ends early, and which parts it would have had behind that.
+fn ends_early(parts: &[(String, Option<Value>)]) -> String {
+    let whole = members(&Document::default().to_json()).0;
+    let is_there = |key: &str| parts.iter().any(|(name, _)| name == key);
+    let lost: Vec<_> =
+        whole.iter().filter(|(key, _)| !is_there(key)).map(|(key, _)| format!("“{key}”")).collect();
+    match lost.is_empty() {
+        true => "it ends early".to_owned(),
+        false => format!("it ends early, without {}", lost.join(", ")),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use flqr_core::model_file::presets;
@@ -254,6 +269,13 @@ mod tests {
             assert!(!problems.is_empty(), "cut at {end}");
             assert!(read.model.is_none() || read.model == full.model, "cut at {end}");
             assert!(read.layout.is_none() || read.layout == full.layout, "cut at {end}");
+            let lost = problems.last().map(String::as_str).unwrap_or_default();
+            let named = |key: &str| text.find(&format!("\n  \"{key}\":")).is_some_and(|at| end < at);
+            if lost != NO_SESSION {
+                for key in ["saved_model", "tab", "theme", "zoom", "runs"] {
+                    assert!(!named(key) || lost.contains(&format!("“{key}”")), "cut at {end}: {lost}");
+                }
+            }
             let behind = |key: &str| text.find(key).is_some_and(|at| end > at);
             if behind("\"saved_model\"") {
                 assert_eq!(read.model, full.model, "cut at {end}");

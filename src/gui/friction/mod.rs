@@ -123,7 +123,7 @@ impl FrictionTab {
     pub(crate) fn drain(&mut self) -> Option<String> {
         let generation = |loader: &Loader| loader.log().map(|loaded| loaded.generation);
         let before = generation(&self.loader);
-        let loaded = self.loader.drain();
+        let loaded = self.loader.drain("“Data health” on the Friction page");
         if generation(&self.loader) != before {
             self.fit.discard();
             self.preview = Preview::default();

@@ -134,7 +134,10 @@ impl Sources {
 
     /// Takes in what the workers have brought; the last sentence if some have ended.
     pub(super) fn drain(&mut self) -> Option<String> {
-        self.list.iter_mut().filter_map(|source| source.loader.drain()).last()
+        self.list
+            .iter_mut()
+            .filter_map(|source| source.loader.drain("the first step of the Refine page"))
+            .last()
     }
 
     pub(super) fn is_loading(&self) -> bool {

@@ -1,6 +1,7 @@
 //! What changed from one row to another.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use egui::{ComboBox, Grid, Label, RichText, ScrollArea, Ui};
 
@@ -11,7 +12,7 @@ use crate::widgets::{change, hint_ui, mono, section_ui, shown};
 const KEY_WIDTH: f32 = 170.0;
 const TEXT_WIDTH: f32 = 90.0;
 
-/// The two rows; until others are chosen those that are ticked, or the last two.
+/// The two rows; until others are chosen those that are ticked, or the last two of one kind.
 #[derive(Default)]
 pub(super) struct Changes {
     chosen: [Option<u64>; 2],
@@ -37,12 +38,19 @@ impl Changes {
     }
 }
 
-/// The two ticked rows, or the last two of all.
+/// The two ticked rows, or the last two of one kind, or the last two of all.
 fn usual(ledger: &Ledger, ticked: &BTreeSet<u64>) -> [Option<u64>; 2] {
     if let (2, Some(first), Some(last)) = (ticked.len(), ticked.first(), ticked.last()) {
         return [Some(*first), Some(*last)];
     }
     let rows = ledger.rows();
+    let with_older = |(index, new): (usize, &Arc<Run>)| {
+        let old = rows[..index].iter().rev().find(|old| old.kind == new.kind)?;
+        Some([Some(old.number), Some(new.number)])
+    };
+    if let Some(alike) = rows.iter().enumerate().rev().find_map(with_older) {
+        return alike;
+    }
     [2, 1].map(|back| rows.len().checked_sub(back).map(|index| rows[index].number))
 }
 
@@ -113,5 +121,31 @@ fn text(value: Option<&Value>) -> String {
         None => "–".to_owned(),
         Some(Value::Number(number)) => shown(*number, 4),
         Some(Value::Text(text)) => text.clone(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::runs::{RunKind, Sources};
+
+    #[test]
+    fn the_newest_rows_of_one_kind_are_compared() {
+        use RunKind::{Experiment, Fit, Refinement};
+        for (kinds, expected) in [
+            (&[Experiment, Experiment, Refinement][..], [Some(1), Some(2)]),
+            (&[Fit, Experiment, Experiment, Fit], [Some(1), Some(4)]),
+            (&[Experiment, Experiment, Experiment], [Some(2), Some(3)]),
+            (&[Experiment, Refinement], [Some(1), Some(2)]),
+            (&[Fit], [None, Some(1)]),
+        ] {
+            let mut ledger = Ledger::default();
+            for kind in kinds {
+                ledger.add(Run::new(*kind, "run", None, Sources::new(None, [])), 7);
+            }
+            assert_eq!(usual(&ledger, &BTreeSet::new()), expected, "{kinds:?}");
+            let ticked = BTreeSet::from([1, 2]);
+            assert_eq!(usual(&ledger, &ticked), [Some(1), Some(2)], "{kinds:?}");
+        }
     }
 }

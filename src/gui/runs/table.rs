@@ -8,6 +8,7 @@ use super::run::{Ledger, Run, RunKind};
 use super::{RunsCommand, overlay};
 use crate::command::Command;
 use crate::context::ViewContext;
+use crate::theme::outline_boxes;
 use crate::widgets::{hint_ui, mono, section_ui};
 
 /// Height of a row, with the room below it.
@@ -200,6 +201,7 @@ fn tick_ui(context: &ViewContext<'_>, run: &Run, ticked: &mut BTreeSet<u64>, ui:
             "Its curves are not in memory any more: its values are compared under “What changed”; its command makes it again"
         }
     };
+    outline_boxes(ui.visuals_mut());
     let check = ui.add_enabled(tick || drawn || run.file().is_some(), Checkbox::new(&mut tick, ""));
     let check = check.accessible_name(format!("show run {number}"));
     if check.on_hover_text(help).on_disabled_hover_text(help).changed() {

@@ -374,6 +374,81 @@ fn a_broken_session_file_never_stops_the_start() {
     }
 }
 
+/// Opens a session by its path.
+fn open_session(window: &mut Window, path: &Path) {
+    command(window, "open a session");
+    enter(window, "path of the file", path.to_str().unwrap());
+}
+
+#[test]
+fn what_a_session_has_lost_stays_in_view_until_the_user_does_something() {
+    let folder = Folder::new("lost");
+    let mut window = open(folder.options(), SIZE);
+    enter(&mut window, "pitch weight", "324");
+    until_kept(&mut window, &folder.running(), "324.0");
+    let whole = std::fs::read_to_string(folder.running()).unwrap();
+    let cut = folder.0.join("cut.flqr-session");
+    std::fs::write(&cut, &whole[..whole.find("\"theme\"").unwrap() + 11]).unwrap();
+    let other = whole.replace("324.0", "5.0");
+    let [lost, garbage] = ["lost.flqr-session", "garbage.flqr-session"].map(|name| folder.0.join(name));
+    std::fs::write(&lost, &other[..other.find("\"theme\"").unwrap() + 11]).unwrap();
+    std::fs::write(&garbage, "\u{1}no session").unwrap();
+    // With a model as it is there already, nothing is asked; with another one, the answer does not take it away.
+    for (path, asks) in [(&cut, false), (&lost, true)] {
+        open_session(&mut window, path);
+        if asks {
+            until(&mut window, "the question", |s| s["question"] == "replace");
+            window.run_steps(2);
+            click(&mut window, "Replace it");
+        }
+        let file = path.to_str().unwrap();
+        let log = |s: &Value| s["message"].as_str().is_some_and(|message| message.contains(file));
+        until(&mut window, "the warning", log);
+        window.run_steps(5);
+        let now = state(&window);
+        assert!(now["question"].is_null(), "{now:#}");
+        assert_eq!(now["message_severity"], "warning");
+        let said = now["message"].as_str().unwrap();
+        for part in ["“theme” cannot be read", "ends early, without “zoom”, “angles”, “runs”"]
+        {
+            assert!(said.contains(part), "{part}: {said}");
+        }
+        window.get_by_label_contains("Not all of the session was read");
+        keys(&mut window, Modifiers::NONE, Key::F1);
+        assert_ne!(state(&window)["message"], said);
+        assert_eq!(state(&window)["message_severity"], "note");
+    }
+    assert_eq!(pitch_weight(&window), 5.0);
+    open_session(&mut window, &garbage);
+    let named = garbage.to_str().unwrap();
+    let found = until(&mut window, "the refusal", |s| s["message"].as_str().unwrap().contains(named));
+    assert_eq!(found["message"], format!("{named} is no session file of flqr; it is kept as it is."));
+}
+
+#[test]
+fn a_question_without_changes_has_no_table() {
+    let folder = Folder::new("same");
+    let mut window = open(folder.options(), SIZE);
+    enter(&mut window, "pitch weight", "325");
+    let kept = folder.0.join("kept.flqr-session");
+    until_kept(&mut window, &folder.running(), "325.0");
+    std::fs::copy(folder.running(), &kept).unwrap();
+    open_session(&mut window, &kept);
+    let named = kept.to_str().unwrap();
+    let found = until(&mut window, "opening", |s| s["message"].as_str().unwrap().contains(named));
+    assert!(found["question"].is_null(), "the very model is in the file: {found:#}");
+    // A controller is in no model file.
+    command(&mut window, "use lqr");
+    assert_eq!(state(&window)["unsaved_changes"], true);
+    assert!(!closes(&mut window));
+    assert!(window.query_by_label("saved").is_some(), "a change of the weight");
+    keys(&mut window, Modifiers::NONE, Key::C);
+    enter(&mut window, "pitch weight", "100");
+    assert!(!closes(&mut window));
+    assert!(window.query_by_label("saved").is_none(), "nothing to list");
+    keys(&mut window, Modifiers::NONE, Key::C);
+}
+
 /// Asks the window to close, and says whether it would.
 fn closes(window: &mut Window) -> bool {
     let viewport = window.input_mut().viewports.entry(ViewportId::ROOT).or_default();

@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::{SIZE, Window, click, command, open, options, state};
+use common::{SIZE, TempFile, Window, click, command, open, options, state, until};
 use egui::{Event, Key, Modifiers, vec2};
 use egui_kittest::kittest::Queryable;
 use flqr_gui::{Tab, WindowOptions};
@@ -213,4 +213,35 @@ fn a_small_window_keeps_every_page_and_source_within_reach() {
         click(&mut window, "replay");
         assert_eq!(state(&window)["source"], "replay", "{size}");
     }
+}
+
+#[test]
+fn the_actions_of_a_page_are_commands() {
+    let mut window = open(options(Tab::Tune), SIZE);
+    command(&mut window, "export");
+    window.get_by_label("figure path");
+    command(&mut window, "refine");
+    assert_eq!(state(&window)["tab"], "refine");
+    command(&mut window, "how far is the model");
+    let said = state(&window)["message"].as_str().unwrap().to_owned();
+    assert!(said.contains("Needs a log"), "{said}");
+}
+
+#[test]
+fn the_status_says_what_is_wrong_with_a_log() {
+    let rows: String = (0..400)
+        .map(|row| {
+            let speed = (0.05 * f64::from(row)).sin();
+            format!("{},{speed},0\n", f64::from(row) * 0.01)
+        })
+        .collect();
+    let file = TempFile::new("dead.csv", &format!("time_s,speed_rad_s,torque_nm\n{rows}"));
+    let mut window = open(WindowOptions { log: Some(file.0.clone()), ..options(Tab::Experiments) }, SIZE);
+    let found = until(&mut window, "loading", |s| s["friction_tab"]["log"]["rows"] == 400);
+    let health = found["friction_tab"]["log"]["health"].as_array().unwrap();
+    let bad = health.iter().filter(|finding| finding["severity"] != "info").count();
+    assert!(bad > 0, "{found:#}");
+    let said = found["message"].as_str().unwrap();
+    let count = format!("400 rows loaded with {bad} health finding");
+    assert!(said.starts_with(&count) && said.contains("“Data health” on the Friction page"), "{said}");
 }
