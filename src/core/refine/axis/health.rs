@@ -1,5 +1,6 @@
 //! What makes a log unfit to refine an axis with, said before any effect is named.
 
+use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 
 use crate::record::{self, HealthFinding, Log, Severity};
@@ -7,7 +8,7 @@ use crate::refine::rates;
 use crate::refine::select::{Blocks, Member};
 
 use super::dead;
-use super::rig::{Declared, Nuisance};
+use super::rig::{Declared, Nuisance, direction};
 use super::trace::{Part, Rows, Trace};
 
 /// Fewest rows in a second at which friction and harmonics of a motor's loop are seen.
@@ -22,6 +23,15 @@ const COHERENT_WITH_GEAR: f64 = 0.3;
 const COHERENT_ALONE: f64 = 0.8;
 /// Degrees in a radian, 1/s of a rev/min, and powers of ten: factors of a unit and of no gear.
 const UNITS: [f64; 5] = [57.296, 9.549, 10.0, 100.0, 1000.0];
+/// A position in another unit makes the inertia look as many times larger or smaller: units that are taken by mistake, in
+/// rad and m, how near such a factor has to come, how sure it has to be, and the share of the effort that it explains.
+const TURNS: [(&str, f64); 2] = [("degrees", 180.0 / PI), ("turns", 1.0 / TAU)];
+const WAYS: [(&str, f64); 2] = [("millimetres", 1000.0), ("centimetres", 100.0)];
+const NEAR_UNIT: f64 = 0.15;
+const SURE_UNIT: f64 = 0.05;
+const DRIVES: f64 = 0.3;
+/// Blocks that tell how sure it is.
+const UNIT_BLOCKS: usize = 12;
 /// Share of the acceleration that is not in the column of the speed from which on they have nothing to do with each other.
 const INCOHERENT: f64 = 0.5;
 /// Share of rows at a limit above which an effort is cut off.
@@ -256,6 +266,46 @@ fn before_a_gear(rows: &Rows, declared: &Declared) -> Option<HealthFinding> {
         names.effort
     );
     Some(finding(Severity::Error, names.effort, problem, mend))
+}
+
+/// Whether the position is in the unit that its column says: nothing else makes an inertia so many times as large.
+pub(super) fn check_unit(
+    rows: &Rows,
+    declared: &Declared,
+    nuisances: &[Nuisance],
+    measured: &[f64],
+) -> Option<HealthFinding> {
+    if declared.gravity != 0.0 || nuisances.iter().any(|nuisance| nuisance.free && nuisance.is_inertia()) {
+        return None;
+    }
+    let fitted: Vec<usize> = (0..rows.rows.len()).filter(|&row| rows.rows[row].part == Part::Fit).collect();
+    let at = |column: &[f64]| -> Vec<f64> { fitted.iter().map(|&row| column[row]).collect() };
+    let speed = rows.pick(|trace, sample| trace.speed[sample]);
+    let columns = [
+        at(&rows.column(Trace::second_difference)),
+        at(&speed),
+        at(&speed.iter().map(|&speed| direction(speed)).collect::<Vec<_>>()),
+        vec![1.0; fitted.len()],
+    ];
+    let views: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+    let block: Vec<usize> = (0..fitted.len()).map(|row| row * UNIT_BLOCKS / fitted.len()).collect();
+    let blocks = Blocks::new(&views, &at(measured), &block);
+    let members = [0, 1, 2, 3].map(Member::free);
+    let judged = blocks.judge(&members, 0.0)?;
+    let inertia = judged.coefficients[0];
+    let driven = blocks.power_beyond(&members[1..], 0.0, &[(0, inertia)])?;
+    let is_sure = judged.standard_error(0) < SURE_UNIT * inertia && driven > DRIVES * (driven + judged.left);
+    let units = if declared.is_linear() { WAYS } else { TURNS };
+    let of = |(_, factor): &&(&str, f64)| (inertia * factor / declared.inertia - 1.0).abs() < NEAR_UNIT;
+    let (unit, factor) = units.iter().find(of).filter(|_| is_sure)?;
+    let name = declared.names().position;
+    let problem = format!(
+        "the effort accelerates the axis as if this column were in {unit}: its unit is wrong, or the declared inertia {:.1} \
+         times off",
+        (inertia / declared.inertia).max(declared.inertia / inertia)
+    );
+    let mend = format!("read it with --map {name}={name}*{:.6}", 1.0 / factor);
+    Some(finding(Severity::Error, name, problem, mend))
 }
 
 /// Whether the measured effort can be what the declared model says it is.

@@ -81,7 +81,11 @@ pub(super) fn residual(
     declared.zeros_rad = carried::zeros_rad(&declared, &rows);
     let [measured, mut target] = declared.targets(&rows);
     let nuisances = declared.nuisances(&rows, &options.estimate)?;
-    data_health.extend(health::check_effort(&rows, &declared, &nuisances, &measured, &target));
+    let of_effort = health::check_effort(&rows, &declared, &nuisances, &measured, &target);
+    if of_effort.is_empty() {
+        data_health.extend(health::check_unit(&rows, &declared, &nuisances, &measured));
+    }
+    data_health.extend(of_effort);
     report(watch, 0.5)?;
     let whitener = search::whitener(&rows, declared.inertia);
     take_out_timing(&nuisances, &whitener, &mut target);
@@ -133,7 +137,11 @@ pub(super) fn refine(
     data_health.extend(health::check_rows(&rows, &declared, fitted, LEAST_ROWS));
     let [measured, target] = declared.targets(&rows);
     let nuisances = declared.nuisances(&rows, &options.estimate)?;
-    data_health.extend(health::check_effort(&rows, &declared, &nuisances, &measured, &target));
+    let of_effort = health::check_effort(&rows, &declared, &nuisances, &measured, &target);
+    if of_effort.is_empty() {
+        data_health.extend(health::check_unit(&rows, &declared, &nuisances, &measured));
+    }
+    data_health.extend(of_effort);
     let friction = |nuisance: &Nuisance| nuisance.free && FRICTION.contains(&nuisance.effect);
     let own = if nuisances.iter().any(friction) { rows.speeds(Part::Fit) } else { None };
     let told_from = own.or(declared.told_from);

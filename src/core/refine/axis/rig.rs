@@ -55,6 +55,11 @@ pub(super) struct Nuisance {
 }
 
 impl Nuisance {
+    /// Whether it is the inertia or mass.
+    pub(super) fn is_inertia(&self) -> bool {
+        self.effect == "inertia_error"
+    }
+
     /// Whether it is the timing of the torque.
     pub(super) fn is_timing(&self) -> bool {
         self.effect == TIMING
@@ -373,7 +378,7 @@ impl Declared {
 
     /// A number as the model file has it.
     pub(super) fn in_file(&self, nuisance: &Nuisance) -> f64 {
-        if nuisance.effect == "inertia_error" { self.declared_inertia } else { nuisance.declared }
+        if nuisance.is_inertia() { self.declared_inertia } else { nuisance.declared }
     }
 
     /// The friction curve with corrected numbers; none where no curve has them.

@@ -7,7 +7,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::model_file::Model;
-use crate::record::{ColumnMap, Log, ReadOptions, Severity, read_log};
+use crate::record::{ColumnMap, HealthFinding, Log, ReadOptions, Severity, read_log};
 use crate::refine::verdict::Channels;
 use crate::refine::{Options, Refinement, Verdict, refine, residual};
 use crate::robot::Motor;
@@ -199,6 +199,37 @@ fn logs_that_cannot_answer_are_told_before_any_effect() {
                 found.data_health
             );
         }
+    }
+}
+
+/// A position in another unit makes the inertia look as many times larger or smaller, and is no effect.
+#[test]
+fn a_position_in_another_unit_is_told_and_no_effect_is() {
+    let log = shaft(1, |_, q, _| 0.006 * (14.0 * q).sin());
+    let scaled = |log: &Log, name: &str, factor: f64| {
+        let columns = log.columns.iter().filter(|column| !column.name.contains("speed")).map(|column| {
+            let factor = if column.name == name { factor } else { 1.0 };
+            (column.name.clone(), column.values.iter().map(|value| factor * value).collect())
+        });
+        Log::from_columns("unit.csv", columns)
+    };
+    let rail = on_rail(&log);
+    for (model, log, name, factor, told) in [
+        (SHAFT, &log, "motor_angle_rad", 360.0 / TAU, "in degrees"),
+        (SHAFT, &log, "motor_angle_rad", 1.0 / TAU, "in turns"),
+        (RAIL, &rail, "position_m", 1000.0, "in millimetres"),
+    ] {
+        let found = refined(model, &[scaled(log, name, factor)], &[], &[]);
+        assert_eq!(
+            (found.verdict, ids(&found)),
+            (Verdict::DataUnfit, vec![]),
+            "{told}: {:#?}",
+            found.data_health
+        );
+        let is_told = |finding: &&HealthFinding| finding.column == name && finding.problem.contains(told);
+        let unit = found.data_health.iter().find(is_told).unwrap();
+        assert!(unit.mend.ends_with(&format!("--map {name}={name}*{:.6}", 1.0 / factor)), "{}", unit.mend);
+        assert_ne!(refined(model, &[scaled(log, name, 1.0)], &[], &[]).verdict, Verdict::DataUnfit, "{told}");
     }
 }
 
