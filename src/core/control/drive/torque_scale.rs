@@ -34,6 +34,11 @@ const DEVIATIONS: f64 = 3.0;
 const LARGEST_DEVIATION: f64 = 0.1;
 const NUDGES: u32 = 3;
 const NEXT_S: f64 = 1.0;
+/// Time between two ticks, and time for which no motor's angle changes, beyond which this computer or the bus stood still
+/// and a nudge may lie, s; it takes so many of those to say that the motors do something else.
+const LATE_S: f64 = 0.003;
+const STALE_S: f64 = 0.01;
+const AGREEING: u32 = 2;
 
 /// The nudge, and what came of it.
 #[derive(Clone, Debug)]
@@ -48,6 +53,11 @@ pub(super) struct TorqueScale {
     way: f64,
     last_s: f64,
     nudges_left: u32,
+    /// Nudges with late ticks that have yet to say that the motors do something else, before it is believed.
+    doubts_left: u32,
+    /// Whether anything was late in this nudge.
+    is_late: bool,
+    changed_s: f64,
 }
 
 /// What has come of the nudges.
@@ -82,6 +92,9 @@ impl TorqueScale {
             way: 0.0,
             last_s: 0.0,
             nudges_left: if balancing { NUDGES } else { 1 },
+            doubts_left: if balancing { AGREEING } else { 1 },
+            is_late: false,
+            changed_s: 0.0,
         }
     }
 
@@ -116,6 +129,10 @@ impl TorqueScale {
         self.way += (self.speed + 0.5 * change) * passed_s;
         self.speed += change;
         let angle = f64::midpoint(readings.motor_angle_rad[0], readings.motor_angle_rad[1]);
+        if self.rows.last().is_none_or(|row| row.1 != angle) {
+            self.changed_s = time_s;
+        }
+        self.is_late |= passed_s > LATE_S || time_s - self.changed_s > STALE_S;
         self.rows.push((since, angle, self.way));
         if since > 2.0 * HALF_S { self.judge() } else { None }
     }
@@ -123,16 +140,22 @@ impl TorqueScale {
     fn judge(&mut self) -> Option<Verdict> {
         let found = self.estimate().filter(|(_, deviation)| *deviation < LARGEST_DEVIATION);
         self.nudges_left -= 1;
-        let Some((factor, deviation)) = found else {
-            self.rows.clear();
-            (self.speed, self.way) = (0.0, 0.0);
-            self.start_s += NEXT_S;
-            return (self.nudges_left == 0).then_some(Verdict::Unclear);
-        };
-        self.nudges_left = 0;
-        let margin = DEVIATIONS * deviation;
-        let wrong = factor + margin < *ALLOWED.start() || factor - margin > *ALLOWED.end();
-        Some(if wrong { Verdict::Wrong { factor } } else { Verdict::Right })
+        if let Some((factor, deviation)) = found {
+            let margin = DEVIATIONS * deviation;
+            let wrong = factor + margin < *ALLOWED.start() || factor - margin > *ALLOWED.end();
+            if wrong {
+                self.doubts_left = if self.is_late { self.doubts_left - 1 } else { 0 };
+            }
+            if !wrong || self.doubts_left == 0 {
+                self.nudges_left = 0;
+                return Some(if wrong { Verdict::Wrong { factor } } else { Verdict::Right });
+            }
+        }
+        self.rows.clear();
+        (self.speed, self.way) = (0.0, 0.0);
+        self.is_late = false;
+        self.start_s += NEXT_S;
+        (self.nudges_left == 0).then_some(Verdict::Unclear)
     }
 
     /// Least squares over the nudge.
@@ -154,5 +177,47 @@ impl TorqueScale {
         let rest = (square - solution.dot(&moment)).max(0.0);
         let variance = rest / (self.rows.len() as f64 - 4.0).max(1.0) * inverse[(0, 0)];
         Some((solution[0] / way, variance.max(0.0).sqrt() / way))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model_file::presets;
+
+    /// Verdict, and when, of motors that do `factors` of what each nudge asks for, with ticks left out in `hole`.
+    fn verdict(factors: [f64; 3], hole: [f64; 2]) -> Option<(f64, Verdict)> {
+        let model = presets::paper();
+        let mut scale = TorqueScale::new(model.robot().unwrap(), true, 2.42);
+        let (mut angle, mut speed, mut acted) = (0.0, 0.0, [0.0; 2]);
+        for tick in 0..4000 {
+            let time_s = f64::from(tick) * TICK_S;
+            let factor = factors[((time_s - 0.5) as usize).min(2)];
+            speed += scale.response * factor * (acted[0] + acted[1]) * TICK_S;
+            angle += speed * TICK_S;
+            if (hole[0]..hole[1]).contains(&time_s) {
+                continue;
+            }
+            let readings = Readings { motor_angle_rad: [angle; 2], ..Readings::default() };
+            if let Some(verdict) = scale.step(time_s, &readings, acted) {
+                return Some((time_s, verdict));
+            }
+            acted = [scale.nudge_nm(time_s); 2];
+        }
+        None
+    }
+
+    #[test]
+    fn a_nudge_with_late_ticks_is_not_believed_alone() {
+        let wrong = |found: Option<(f64, Verdict)>| match found {
+            Some((time_s, Verdict::Wrong { .. })) => time_s,
+            other => panic!("{other:?}"),
+        };
+        let (none, hole) = ([9.0, 9.0], [1.02, 1.032]);
+        assert!(wrong(verdict([0.5; 3], none)) < 1.1);
+        let late = wrong(verdict([0.5; 3], hole));
+        assert!(late > 1.9 && late < 2.2, "{late}");
+        let healed = verdict([0.5, 1.0, 1.0], hole);
+        assert!(matches!(healed, Some((time_s, Verdict::Right)) if time_s > 1.9), "{healed:?}");
     }
 }
