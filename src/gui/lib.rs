@@ -27,6 +27,7 @@ mod job;
 mod layout;
 mod live;
 mod load;
+mod log_slider;
 mod memory;
 mod messages;
 mod panes;

@@ -30,6 +30,7 @@ pub(crate) const GESTURES: &[(&str, &str)] = &[
     ("Esc, Space", "STOP a robot that is checked or driven: no torque, motors off"),
     ("Space, ←, →", "play, step (with Shift or Alt: longer, shorter) an experiment"),
     ("Tab, Shift+Tab", "next, previous control"),
+    ("drag, ←, → of a weight", "1.5 % a point or press, with Shift 0.15 %"),
     ("drag, wheel, double click", "move, zoom, follow again (plots)"),
     ("drag of a tab", "move a page to another tile (once there are two)"),
 ];

@@ -58,6 +58,34 @@ fn a_drag_of_a_slider_changes_the_gains_while_it_lasts() {
 }
 
 #[test]
+fn a_point_of_a_drag_and_an_arrow_are_a_percent_or_two_and_a_tenth_of_that_with_shift() {
+    let mut window = open(options(Tab::Tune), SIZE);
+    let weight = |window: &Window| state(window)["q_diagonal"][2].as_f64().unwrap();
+    let percent = |before: f64, after: f64, points: f64| 100.0 * ((after / before).powf(points.recip()) - 1.0);
+    let slider = window.get_by_label("pitch weight slider").rect();
+    let before = weight(&window);
+    window.drag_at(slider.center());
+    window.step();
+    // Far beyond the rail, so that all magnitudes are in reach of one drag.
+    window.hover_at(slider.center() + vec2(300.0, 0.0));
+    window.step();
+    window.drop_at(slider.center() + vec2(300.0, 0.0));
+    window.run_steps(2);
+    let dragged = weight(&window);
+    assert!((1.0..=2.0).contains(&percent(before, dragged, 300.0)), "{before} to {dragged}");
+    assert_eq!(state(&window)["undo"], serde_json::json!(["pitch weight 100 → 9001.7"]), "one step");
+
+    // The drag has given it the keyboard.
+    window.key_press(Key::ArrowLeft);
+    window.run_steps(2);
+    let stepped = weight(&window);
+    assert!((-2.0..=-1.0).contains(&percent(dragged, stepped, 1.0)), "{dragged} to {stepped}");
+    window.key_press_modifiers(Modifiers::SHIFT, Key::ArrowLeft);
+    window.run_steps(2);
+    assert!((-0.2..=-0.1).contains(&percent(stepped, weight(&window), 1.0)), "{stepped}");
+}
+
+#[test]
 fn a_deviation_that_counts_as_1_sets_its_weight() {
     let mut window = open(options(Tab::Tune), SIZE);
     enter(&mut window, "displacement deviation", "0.05");

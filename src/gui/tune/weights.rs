@@ -1,11 +1,14 @@
 //! The Q/R editor: one row a weight, with the deviation that it makes count as 1.
 
-use egui::{Button, Slider, SliderClamping, Ui};
+use std::ops::RangeInclusive;
+
+use egui::{Button, Ui};
 use flqr_core::lqr::Weights;
 
 use super::matrices::matrices_ui;
 use crate::command::Command;
 use crate::context::ViewContext;
+use crate::log_slider::{HELP, log_slider_ui};
 use crate::quantity::STATES;
 use crate::widgets::{choice_ui, hint_ui, number_ui, section_ui};
 
@@ -19,8 +22,7 @@ struct Row {
 }
 
 /// Range of the sliders; fields take any number.
-const SMALLEST: f64 = 1e-4;
-const LARGEST: f64 = 1e4;
+const SLIDERS: RangeInclusive<f64> = 1e-4..=1e4;
 
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
@@ -123,17 +125,12 @@ impl WeightEditor {
     fn row_ui(&self, ui: &mut Ui, row: &Row, (weight, saved): (&mut f64, f64), focus: bool) {
         ui.label(row.name).on_hover_text(row.help);
         ui.spacing_mut().slider_width = 52.0;
-        let slider = Slider::new(weight, SMALLEST..=LARGEST)
-            .logarithmic(true)
-            .smallest_positive(SMALLEST)
-            .clamping(SliderClamping::Never)
-            .show_value(false);
-        let slider = ui.add(slider).accessible_name(format!("{} weight slider", row.name));
-        slider.on_hover_text(row.help);
+        let slider = log_slider_ui(ui, weight, &SLIDERS, &format!("{} weight slider", row.name));
+        slider.on_hover_text(format!("{}\n{HELP}", row.help));
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 2.0;
             self.step_ui(ui, row, weight, Step::Down);
-            let field = number_ui(ui, weight, &format!("{} weight", row.name), 64.0);
+            let field = number_ui(ui, weight, &format!("{} weight", row.name), 76.0);
             if focus {
                 field.request_focus();
             }
