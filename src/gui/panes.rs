@@ -17,6 +17,7 @@ pub(crate) struct Pane<K> {
     place: Place,
     width: f32,
     least_height: f32,
+    scrolls: bool,
     wanted: bool,
 }
 
@@ -29,17 +30,26 @@ enum Place {
 impl<K> Pane<K> {
     /// At the left, `width` wide until it is dragged within `widths`; scrolls.
     pub(crate) fn left(key: K, name: &'static str, width: f32, widths: RangeInclusive<f32>) -> Self {
-        Self { key, name, place: Place::Left(widths), width, least_height: LEAST_HEIGHT, wanted: false }
+        Self::new(key, name, Place::Left(widths), width)
     }
 
     /// What is left between the others, and at least `width`.
     pub(crate) fn middle(key: K, name: &'static str, width: f32) -> Self {
-        Self { key, name, place: Place::Middle, width, least_height: LEAST_HEIGHT, wanted: false }
+        Self::new(key, name, Place::Middle, width)
     }
 
     /// As [`Self::left`], at the right.
     pub(crate) fn right(key: K, name: &'static str, width: f32, widths: RangeInclusive<f32>) -> Self {
-        Self { key, name, place: Place::Right(widths), width, least_height: LEAST_HEIGHT, wanted: false }
+        Self::new(key, name, Place::Right(widths), width)
+    }
+
+    fn new(key: K, name: &'static str, place: Place, width: f32) -> Self {
+        Self { key, name, place, width, least_height: LEAST_HEIGHT, scrolls: true, wanted: false }
+    }
+
+    /// At a side without a scroll bar: it fills its room, or scrolls a part of itself.
+    pub(crate) fn fixed(self) -> Self {
+        Self { scrolls: false, ..self }
     }
 
     /// In the middle, at least `height` high.
@@ -65,10 +75,12 @@ pub(crate) fn panes_ui<K: Copy>(
     let central = Frame::central_panel(ui.style()).inner_margin(margin);
     let id = Id::unique(("pane in front", page));
     let middle = panes.iter().position(|pane| matches!(pane.place, Place::Middle)).unwrap_or(0);
-    let mut front = ui.data(|data| data.get_temp::<usize>(id)).unwrap_or(middle).min(panes.len().max(1) - 1);
+    // By its name: a page may have other panes in less room.
+    let chosen = ui.data(|data| data.get_temp::<&'static str>(id));
+    let mut front = panes.iter().position(|pane| Some(pane.name) == chosen).unwrap_or(middle);
     if let Some(wanted) = panes.iter().position(|pane| pane.wanted) {
         front = wanted;
-        ui.data_mut(|data| data.insert_temp(id, front));
+        ui.data_mut(|data| data.insert_temp(id, panes[wanted].name));
     }
     let widths: Vec<f32> = panes.iter().map(|pane| pane.width).collect();
     let room = ui.available_width();
@@ -88,7 +100,7 @@ pub(crate) fn panes_ui<K: Copy>(
         });
         if let Some(chosen) = chosen.inner {
             front = chosen;
-            ui.data_mut(|data| data.insert_temp(id, front));
+            ui.data_mut(|data| data.insert_temp(id, panes[chosen].name));
             shown = in_view(&widths, front, room);
         }
     }
@@ -104,6 +116,9 @@ pub(crate) fn panes_ui<K: Copy>(
         panel.frame(side).resizable(true).default_size(pane.width).size_range(widths.clone()).show(
             ui,
             |ui| {
+                if !pane.scrolls {
+                    return show(pane.key, ui);
+                }
                 ScrollArea::vertical().show(ui, |ui| show(pane.key, ui));
             },
         );
@@ -118,6 +133,7 @@ pub(crate) fn panes_ui<K: Copy>(
                 ui.allocate_ui(size, |ui| show(*key, ui));
             });
         }
+        Some(pane) if !pane.scrolls => show(pane.key, ui),
         Some(pane) => {
             ScrollArea::vertical().auto_shrink(false).show(ui, |ui| show(pane.key, ui));
         }

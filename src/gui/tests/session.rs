@@ -75,9 +75,6 @@ fn a_drag_a_typed_value_and_a_choice_are_one_step_each() {
     window.run_steps(2);
     let dragged = pitch_weight(&window);
     enter(&mut window, "velocity weight", "77");
-    // The table of differences has moved it below the edge.
-    window.get_by_label("LQR").scroll_to_me();
-    window.run_steps(3);
     click(&mut window, "LQR");
     enter(&mut window, "left torque weight", "25");
     let undo = state(&window)["undo"].clone();

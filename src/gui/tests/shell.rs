@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::{SIZE, TempFile, Window, click, command, open, options, state, until};
+use common::{SIZE, TempFile, Window, click, command, enter, open, options, state, until};
 use egui::{Event, Key, Modifiers, vec2};
 use egui_kittest::kittest::Queryable;
 use flqr_gui::{Tab, WindowOptions};
@@ -172,6 +172,42 @@ fn in_a_narrow_window_the_panes_of_a_page_are_behind_their_names() {
         wide.query_by_label("Robot and prediction").is_none(),
         "where all have room, no names are needed"
     );
+}
+
+/// At 1280 by 800 pixels on a screen of scale 1, and of scale 2 with 1920 by 1080.
+#[test]
+fn what_runs_and_what_it_needs_stay_in_view_beside_another_design() {
+    for size in [SIZE, vec2(960.0, 540.0)] {
+        let mut window = open(options(Tab::Tune), size);
+        enter(&mut window, "pitch weight", "250");
+        until(&mut window, "the trials", |s| s["tune_tab"]["trials"]["largest_pitch_rad"].is_number());
+        window.run_steps(3);
+        let bottom = window.get_by_label_contains("simulated: paused").rect().top();
+        let seen = |label: &str| {
+            let rect = window.get_by_label(label).rect();
+            assert!(rect.top() >= 0.0 && rect.bottom() <= bottom, "{label} at {rect:?} of {size}");
+        };
+        ["design A", "design B", "LQR", "FLQR", "compensation ratio"].into_iter().for_each(seen);
+        if size == SIZE {
+            ["step size", "show step"].into_iter().for_each(seen);
+            window.get_by_label_contains("Gets up from a lean");
+        }
+    }
+}
+
+#[test]
+fn a_low_window_shows_the_robot_and_the_prediction_one_at_a_time() {
+    // Screens of scale 2 with 1920 by 1080 and 1280 by 800 pixels.
+    for size in [vec2(960.0, 520.0), vec2(640.0, 376.0)] {
+        let mut window = open(options(Tab::Tune), size);
+        assert!(window.query_by_label("Predicted").is_none(), "{size}");
+        click(&mut window, "Prediction");
+        window.get_by_label("Predicted");
+        let bottom = window.get_by_label_contains("simulated: paused").rect().top();
+        let plane = window.get_by_label("plane of poles").rect();
+        assert!(plane.bottom() <= bottom && plane.height() > 80.0, "{plane:?} of {size}");
+        assert!(plane.right() <= size.x && plane.width() > 60.0, "{plane:?} of {size}");
+    }
 }
 
 #[test]

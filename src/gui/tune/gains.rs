@@ -1,6 +1,6 @@
-//! Gains of the design in force, and the friction feedforward.
+//! Gains of the design in force, and the controller that they are part of.
 
-use egui::{Grid, RichText, Slider, SliderClamping, Ui};
+use egui::{Grid, RichText, Ui};
 use flqr_core::control::ControllerKind;
 use flqr_core::lqr::LqrDesign;
 
@@ -79,43 +79,32 @@ fn rows_are_equal(design: &LqrDesign) -> bool {
     })
 }
 
-/// LQR or FLQR, and how much friction is fed forward.
-pub(super) fn feedforward_ui(context: &ViewContext<'_>, ui: &mut Ui) {
-    section_ui(ui, "Friction feedforward", |ui| {
+/// LQR or FLQR, and how much friction is fed forward, in one row.
+pub(super) fn controller_ui(context: &ViewContext<'_>, ui: &mut Ui) {
+    let before = context.session.compensation();
+    let mut compensation = before;
+    let active = context.session.controller == ControllerKind::Flqr;
+    ui.horizontal(|ui| {
         let mut kind = context.session.controller;
-        // Drawn from the right, so the last comes first.
         let choices = [
-            (ControllerKind::Flqr, "FLQR", "Gains plus friction feedforward"),
             (ControllerKind::Lqr, "LQR", "Gains alone"),
+            (ControllerKind::Flqr, "FLQR", "Gains plus friction feedforward"),
         ];
         ui.scope(|ui| {
             if choice_ui(ui, &mut kind, &choices) {
                 context.commands.send(Command::SetController(kind));
             }
         });
-    });
-    let before = context.session.compensation();
-    let mut compensation = before;
-    let active = context.session.controller == ControllerKind::Flqr;
-    ui.add_enabled_ui(active, |ui| {
-        Grid::new("compensation").num_columns(4).spacing([8.0, 4.0]).show(ui, |ui| {
-            ui.label("ratio").on_hover_text("Share of the friction that is compensated");
-            let slider = ui.add(Slider::new(&mut compensation.ratio, 0.0..=1.5).show_value(false));
-            slider.accessible_name("compensation ratio slider");
-            number_ui(ui, &mut compensation.ratio, "compensation ratio", 58.0);
-            ui.label("");
-            ui.end_row();
-            ui.label("smoothing").on_hover_text(
+        ui.add_enabled_ui(active, |ui| {
+            ui.spacing_mut().item_spacing.x = 5.0;
+            ui.label("ratio");
+            number_ui(ui, &mut compensation.ratio, "compensation ratio", 44.0)
+                .on_hover_text("Share of the friction that is fed forward");
+            ui.label("smoothing");
+            number_ui(ui, &mut compensation.smoothing_speed_rad_s, "smoothing speed", 44.0).on_hover_text(
                 "Speed over which the direction turns from −1 to 1, so that the feedforward does not chatter at rest",
             );
-            let slider = Slider::new(&mut compensation.smoothing_speed_rad_s, 1e-3..=1.0)
-                .logarithmic(true)
-                .clamping(SliderClamping::Never)
-                .show_value(false);
-            ui.add(slider).accessible_name("smoothing speed slider");
-            number_ui(ui, &mut compensation.smoothing_speed_rad_s, "smoothing speed", 58.0);
-            ui.label(RichText::new("rad/s").monospace());
-            ui.end_row();
+            ui.label(RichText::new("rad/s").small());
         });
     });
     if compensation != before {

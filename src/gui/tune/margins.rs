@@ -39,11 +39,13 @@ pub(super) fn ui(designed: &Designed, poles: &[SampledPole], ui: &mut Ui) {
         return;
     }
     let rows = rows(designed);
-    Grid::new("margins").num_columns(3).min_col_width(14.0).spacing([8.0, 2.0]).show(ui, |ui| {
-        for row in &rows {
-            row.verdict.mark_ui(ui, row.name);
-            ui.label(row.name).on_hover_text(row.help);
-            ui.label(mono(&row.value)).on_hover_text(row.help);
+    Grid::new("margins").num_columns(6).min_col_width(14.0).spacing([6.0, 2.0]).show(ui, |ui| {
+        for pair in rows.chunks(2) {
+            for row in pair {
+                row.verdict.mark_ui(ui, row.name);
+                ui.label(row.name).on_hover_text(row.help);
+                ui.label(mono(&row.value).size(11.5)).on_hover_text(row.help);
+            }
             ui.end_row();
         }
     });
@@ -72,7 +74,7 @@ fn rows(designed: &Designed) -> Vec<Row> {
         Row {
             name: "gain up",
             value: if up.is_finite() {
-                format!("×{}   {}", shown(up, 3), decibels(up))
+                format!("×{} {}", shown(up, 3), decibels(up))
             } else {
                 "any".to_owned()
             },
@@ -87,7 +89,7 @@ fn rows(designed: &Designed) -> Vec<Row> {
         Row {
             name: "gain down",
             value: if margins.gain_down > 0.0 {
-                format!("×{}   {}", shown(margins.gain_down, 3), decibels(margins.gain_down))
+                format!("×{} {}", shown(margins.gain_down, 3), decibels(margins.gain_down))
             } else {
                 "any".to_owned()
             },
@@ -97,7 +99,7 @@ fn rows(designed: &Designed) -> Vec<Row> {
         },
         Row {
             name: "phase",
-            value: format!("{}°   at {}", shown(phase_deg, 3), hertz(margins.crossover_rad_s)),
+            value: format!("{}° at {}", shown(phase_deg, 3), hertz(margins.crossover_rad_s)),
             help: "Lag between command and torque until it oscillates, and the frequency at which the loop's gain passes 1",
             verdict: Verdict::of(phase_deg, PHASE_DEG[0], PHASE_DEG[1]),
             then: format!(

@@ -16,7 +16,7 @@ mod weights;
 
 use std::path::Path;
 
-use egui::{CentralPanel, Frame, Margin, Panel, Ui};
+use egui::{CentralPanel, Frame, Margin, Panel, ScrollArea, Ui};
 
 use crate::command::{Command, FilePurpose, Source};
 use crate::context::ViewContext;
@@ -31,6 +31,9 @@ use parameters::ParameterEditor;
 use predicted::Predicted;
 use trials::Trials;
 use weights::WeightEditor;
+
+/// A page that is lower shows the robot and the prediction one at a time, each over its whole height.
+const ROOM_FOR_BOTH: f32 = 600.0;
 
 /// State of the page that is no part of the session.
 pub(crate) struct TuneTab {
@@ -97,18 +100,20 @@ impl TuneTab {
         })
     }
 
-    /// The left side, from the weights to what follows from them.
+    /// The left side: what runs is always in view, and below it the weights and what follows from them.
     fn design_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
         compare::slots_ui(context, ui);
-        self.weights.ui(context, ui);
-        gains::ui(context, ui);
-        let peaks_nm = self.trials.shown_peaks_nm(context);
-        compare::differences_ui(context, peaks_nm, ui);
-        if let Some(designed) = &context.designer.in_force {
-            margins::ui(designed, self.predicted.poles(context, &self.trials), ui);
-        }
-        self.trials.ui(context, ui);
-        gains::feedforward_ui(context, ui);
+        gains::controller_ui(context, ui);
+        ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+            self.weights.ui(context, ui);
+            gains::ui(context, ui);
+            let peaks_nm = self.trials.shown_peaks_nm(context);
+            compare::differences_ui(context, peaks_nm, ui);
+            if let Some(designed) = &context.designer.in_force {
+                margins::ui(designed, self.predicted.poles(context, &self.trials), ui);
+            }
+            self.trials.ui(context, ui);
+        });
     }
 
     pub(crate) fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
@@ -122,13 +127,23 @@ impl TuneTab {
             return;
         }
         let weights = Pane::left(Part::Weights, "Weights and gains", 412.0, 400.0..=480.0)
+            .fixed()
             .in_front(self.weights.focus_first);
-        let plots = Pane::middle(Part::Plots, "Robot and prediction", 400.0).at_least(540.0);
-        panes_ui(ui, "tune", &[weights, plots, model], |part, ui| match part {
+        let show = |part: Part, ui: &mut Ui| match part {
             Part::Weights => self.design_ui(context, ui),
+            Part::Both => self.both_ui(context, ui),
             Part::Plots => self.plots_ui(context, ui),
+            Part::Predicted => self.predicted.ui(context, &mut self.trials, ui),
             Part::Model => self.model_ui(context, ui),
-        });
+        };
+        if ui.available_height() >= ROOM_FOR_BOTH {
+            let both = Pane::middle(Part::Both, "Robot and prediction", 400.0);
+            panes_ui(ui, "tune", &[weights, both, model], show);
+        } else {
+            let plots = Pane::middle(Part::Plots, "Robot", 400.0).at_least(180.0);
+            let predicted = Pane::right(Part::Predicted, "Prediction", 400.0, 300.0..=700.0).fixed();
+            panes_ui(ui, "tune", &[weights, plots, predicted, model], show);
+        }
     }
 
     fn model_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
@@ -138,21 +153,23 @@ impl TuneTab {
     }
 
     /// The live robot above what the design predicts.
-    fn plots_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
+    fn both_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
         let frame = Frame::NONE.inner_margin(Margin::symmetric(0, 6));
         Panel::bottom("predicted")
             .frame(frame)
             .resizable(true)
-            .default_size(224.0)
-            .size_range(120.0..=420.0)
+            .default_size(240.0)
+            .size_range(160.0..=420.0)
             .show(ui, |ui| self.predicted.ui(context, &mut self.trials, ui));
+        CentralPanel::default().frame(Frame::NONE).show(ui, |ui| self.plots_ui(context, ui));
+    }
+
+    fn plots_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
         // What a session has brought stays in view after its end.
         let shown = context.source == Source::Simulated
             || context.link.is_open()
             || !context.history.time_s().is_empty();
-        CentralPanel::default()
-            .frame(Frame::NONE)
-            .show(ui, |ui| if shown { self.plots.ui(context, ui) } else { not_connected_ui(context, ui) });
+        if shown { self.plots.ui(context, ui) } else { not_connected_ui(context, ui) }
     }
 }
 
@@ -160,7 +177,10 @@ impl TuneTab {
 #[derive(Clone, Copy)]
 enum Part {
     Weights,
+    /// The robot above the prediction.
+    Both,
     Plots,
+    Predicted,
     Model,
 }
 
