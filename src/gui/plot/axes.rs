@@ -1,6 +1,6 @@
 //! One look for all axes: round grid values, quiet lines, labels with units.
 
-use egui::{Color32, FontId, Rangef, RichText, Visuals};
+use egui::{Align2, Color32, FontId, Rangef, Rect, RichText, Ui, Visuals, vec2};
 use egui_plot::{AxisHints, GridInput, GridMark, HPlacement, Plot};
 
 /// Width kept for a vertical axis, so that stacked plots line up.
@@ -73,6 +73,20 @@ impl SecondAxis {
 }
 
 impl<'a> Axes<'a> {
+    /// Length of the vertical axis.
+    fn length(&self) -> f32 {
+        self.height - if self.x_label.is_some() { X_AXIS_HEIGHT } else { 0.0 }
+    }
+
+    /// Writes what has no room along the vertical axis into the corner of the plot, which has `frame`.
+    pub(crate) fn name_in(&self, frame: Rect, ui: &Ui) {
+        if let Some(name) = left_out(self.y_label, self.length()) {
+            let (place, font) = (frame.left_top() + vec2(4.0, 1.0), FontId::proportional(11.5));
+            let color = ui.visuals().weak_text_color();
+            ui.painter().with_clip_rect(frame).text(place, Align2::LEFT_TOP, name, font, color);
+        }
+    }
+
     /// Gives a plot these axes.
     pub(crate) fn on<'p>(&self, plot: Plot<'p>, visuals: &Visuals) -> Plot<'p>
     where
@@ -95,8 +109,7 @@ impl<'a> Axes<'a> {
         };
         let (x_lines, y_lines, logarithmic) = (self.x_lines, self.y_lines, extras.logarithmic);
         let x = hints(AxisHints::new_x(), self.x_label.unwrap_or_default(), Rangef::new(24.0, 30.0));
-        let below = if self.x_label.is_some() { X_AXIS_HEIGHT } else { 0.0 };
-        let y_label = fitting(self.y_label, self.height - below);
+        let y_label = fitting(self.y_label, self.length());
         let y = hints(AxisHints::new_y(), y_label, Rangef::new(12.0, 16.0))
             .placement(HPlacement::Left)
             .min_thickness(Y_AXIS_WIDTH);
@@ -117,6 +130,12 @@ impl<'a> Axes<'a> {
             })
             .grid_color(grid_color(visuals))
     }
+}
+
+/// The name that a label along an axis of `length` leaves out.
+fn left_out(label: &str, length: f32) -> Option<&str> {
+    let name = label.rfind('[').map_or(label, |at| label[..at].trim_end());
+    (fitting(label, length) != label && !name.is_empty()).then_some(name)
 }
 
 /// As much of a label as fits along an axis: all of it, the unit, or nothing.
@@ -223,6 +242,8 @@ mod tests {
         ] {
             assert_eq!(fitting(label, length), left, "{label} on {length}");
         }
+        assert_eq!(left_out("velocity [m/s]", 50.0), Some("velocity"), "it is written into the plot");
+        assert_eq!([left_out("velocity [m/s]", 100.0), left_out("", 0.0)], [None, None]);
     }
 
     #[test]

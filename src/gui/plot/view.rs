@@ -115,7 +115,7 @@ impl TimePlot<'_> {
             .label_formatter(|_| None);
         let plot = axes.with(&drawing.extras, plot, ui.visuals());
         let limit_color = palette(ui.visuals()).error;
-        plot.show(ui, |plot_ui| {
+        let shown = plot.show(ui, |plot_ui| {
             plot_ui.set_plot_bounds_x(range[0]..=range[1]);
             plot_ui.set_plot_bounds_y(drawing.y_range[0]..=drawing.y_range[1]);
             for (number, (name, value)) in drawing.limits.iter().enumerate() {
@@ -135,7 +135,9 @@ impl TimePlot<'_> {
                 }
             }
             beside(plot_ui);
-        })
+        });
+        axes.name_in(*shown.transform.frame(), ui);
+        shown
     }
 
     /// About how many horizontal grid lines there are.

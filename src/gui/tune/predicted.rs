@@ -35,7 +35,7 @@ impl Shown {
         match self {
             Self::Displacement => "displacement [m]",
             Self::Pitch => "pitch [°]",
-            Self::Torque => "torque of a motor [N m]",
+            Self::Torque => "motor torque [N m]",
         }
     }
 
@@ -112,7 +112,19 @@ impl Predicted {
         }
         self.update(context, trials.shown());
         let many = ui.available_width() >= ROOM_FOR_MORE;
-        ui.horizontal(|ui| self.head_ui(context, trials, many, ui));
+        let text = self.text(context, trials);
+        let beside = ui.horizontal(|ui| {
+            self.head_ui(trials, many, ui);
+            ui.separator();
+            let fits = small_width(&text, ui) <= ui.available_width();
+            if fits {
+                summary_ui(&text, ui);
+            }
+            fits
+        });
+        if !beside.inner {
+            summary_ui(&text, ui);
+        }
         let shown: &[Shown] = match (many, self.first) {
             (true, _) => &[Shown::Displacement, Shown::Pitch, Shown::Torque],
             (false, first) => &[first, Shown::Torque],
@@ -135,7 +147,7 @@ impl Predicted {
         });
     }
 
-    fn head_ui(&mut self, context: &ViewContext<'_>, trials: &mut Trials, many: bool, ui: &mut Ui) {
+    fn head_ui(&mut self, trials: &mut Trials, many: bool, ui: &mut Ui) {
         ui.label(egui::RichText::new("Predicted").heading().strong());
         trials.choice_ui(ui);
         if !many {
@@ -148,23 +160,16 @@ impl Predicted {
         }
         ui.separator();
         self.plane.choice_ui(ui);
-        ui.separator();
-        let mut text = format!("{}: {}", trials.shown_text(), self.now.summary);
-        if !self.other.summary.is_empty() {
-            let designer = context.designer;
-            text = format!(
-                "{}: {} {}, {} {}",
-                trials.shown_text(),
-                designer.active.name(),
-                self.now.summary,
-                designer.active.other().name(),
-                self.other.summary
-            );
+    }
+
+    /// What the plots show, in words and numbers.
+    fn text(&self, context: &ViewContext<'_>, trials: &Trials) -> String {
+        let (of, now) = (trials.shown_text(), &self.now.summary);
+        if self.other.summary.is_empty() {
+            return format!("{of}: {now}");
         }
-        let label = egui::Label::new(egui::RichText::new(text.as_str()).small().weak()).truncate();
-        ui.add(label).on_hover_text(format!(
-            "{text}. Linear, with the loop's tick, delay and held IMU; without noise, friction and torque limit"
-        ));
+        let [active, other] = [context.designer.active, context.designer.active.other()].map(|slot| slot.name());
+        format!("{of}: {active} {now}; {other} {}", self.other.summary)
     }
 
     fn response_plot(
@@ -231,6 +236,18 @@ impl Response {
             Shown::Torque => &self.torque_nm,
         }
     }
+}
+
+fn summary_ui(text: &str, ui: &mut Ui) {
+    hint_ui(ui, text).on_hover_text(
+        "Linear, with the loop's tick, delay and held IMU; without noise, friction and torque limit",
+    );
+}
+
+/// Width of a small text in one line.
+fn small_width(text: &str, ui: &Ui) -> f32 {
+    let font = egui::TextStyle::Small.resolve(ui.style());
+    ui.painter().layout_no_wrap(text.to_owned(), font, Color32::PLACEHOLDER).size().x
 }
 
 fn stronger([left, right]: [f64; 2]) -> f64 {
