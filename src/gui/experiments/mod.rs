@@ -266,7 +266,7 @@ impl ExperimentsTab {
                 self.page = page.with_min_x(ui.max_rect().left() - MARGIN);
                 self.plots_ui(&comparison, context.commands, ui);
             }
-            Part::Robot => self.robot_ui(&comparison, ui, page.height()),
+            Part::Robot => self.robot_ui(&comparison, ui),
         });
     }
 
@@ -302,7 +302,9 @@ impl ExperimentsTab {
         commands_ui(comparison, ui);
     }
 
-    fn robot_ui(&mut self, comparison: &Comparison, ui: &mut Ui, room: f32) {
+    fn robot_ui(&mut self, comparison: &Comparison, ui: &mut Ui) {
+        // What is in view: the pane scrolls, so that what is available has no end.
+        let room = ui.clip_rect().height();
         let count = comparison.recorded().count().max(1) as f32;
         let spacing = ui.spacing().item_spacing.y;
         let height = ((room - self.table_height) / count - spacing).clamp(96.0, 420.0);

@@ -89,6 +89,19 @@ fn both_runs_appear_with_the_statistics_of_the_core() {
 }
 
 #[test]
+fn the_last_row_of_the_statistics_is_in_view_and_numbers_beside_the_plots_say_of_when_they_are() {
+    for size in [SIZE, egui::vec2(1920.0, 1080.0)] {
+        let mut window = open(options(Tab::Experiments), size);
+        run_both(&mut window, "2");
+        window.run_steps(3);
+        let status = window.get_by_label_contains("simulated: paused").rect().top();
+        let last = window.get_all_by_label("std").map(|row| row.rect().bottom()).fold(0.0, f32::max);
+        assert!(last > 0.0 && last <= status, "{last} of {status} in {size}");
+        assert_eq!(window.get_all_by_label("at 0.00 s").count(), 3, "one for each plot");
+    }
+}
+
+#[test]
 fn a_chosen_range_gives_the_statistics_of_that_range() {
     let mut window = page();
     run_both(&mut window, "2");

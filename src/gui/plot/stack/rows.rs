@@ -62,7 +62,7 @@ impl Stack {
                 });
                 if has_statistics {
                     let cursor = around.marks.as_ref().map(|marks| marks.cursor);
-                    ui.vertical(|ui| self.statistics_ui(ui, &row.inner, cursor));
+                    ui.vertical(|ui| self.statistics_ui(ui, &row.inner, cursor, heights));
                 }
             });
         }

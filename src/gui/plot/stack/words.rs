@@ -9,6 +9,9 @@ use crate::plot::unit::label;
 use crate::quantity::to_scale;
 use crate::widgets::mono;
 
+/// Height of a line of numbers beside a plot.
+const LINE: f32 = 14.0;
+
 impl Stack {
     /// What a plot shows, in words.
     pub(super) fn summary(&self, row: &Row<'_, '_>) -> String {
@@ -35,12 +38,26 @@ impl Stack {
     }
 
     /// What a reader of the plot would measure, as text: at a cursor of the page, or of the visible range.
-    pub(super) fn statistics_ui(&mut self, ui: &mut Ui, row: &Row<'_, '_>, cursor: Option<f64>) {
+    /// Lines for which a plot of this `height` has no room are left out.
+    pub(super) fn statistics_ui(&mut self, ui: &mut Ui, row: &Row<'_, '_>, cursor: Option<f64>, height: f32) {
         ui.spacing_mut().item_spacing.y = 2.0;
+        let bottom = ui.next_widget_position().y + height;
+        let has_room = |ui: &Ui| ui.next_widget_position().y + LINE <= bottom;
         ui.add_space(6.0);
         ui.label(RichText::new(label(&row.panel.name, row.unit)).small().weak());
         let several = row.panel.curves.len() > 1;
+        let told = match cursor {
+            Some(at) => Some((format!("at {} s", to_scale(at, 1.0)), "Values at the time that is shown")),
+            None if several => Some(("mean".to_owned(), "Means of the visible samples")),
+            None => None,
+        };
+        if let Some((told, help)) = told.filter(|_| has_room(ui)) {
+            ui.label(RichText::new(told).small().weak()).on_hover_text(help);
+        }
         for (curve, found) in row.panel.curves.iter().zip(&row.statistics) {
+            if !has_room(ui) {
+                break;
+            }
             let name = if several { curve.name.as_ref() } else { "value" };
             if let Some(cursor) = cursor {
                 let indexed = indexed(&mut self.caches, row.panel, curve, self.units);
@@ -49,7 +66,8 @@ impl Stack {
                 let peak = found.map_or(0.0, |found| found.peak_to_peak());
                 let scale = (row.panel.min_span * row.scale).max(0.1 * peak);
                 let text = format!("{name:<6.6}{:>9}", to_scale(value, scale));
-                ui.label(mono(text).color(curve.color)).on_hover_text("Value at the time that is shown");
+                let said = format!("{} at the time that is shown, {}", row.panel.curve_name(curve), row.unit);
+                ui.label(mono(text).color(curve.color)).on_hover_text(said);
                 continue;
             }
             let [mean, std, peak] =
@@ -57,7 +75,8 @@ impl Stack {
             let scale = if peak.is_nan() { 0.0 } else { peak };
             if several {
                 let text = format!("{name:<6.6}{:>9}", to_scale(mean, scale));
-                ui.label(mono(text).color(curve.color)).on_hover_text("Mean of the visible samples");
+                let said = format!("Mean of {}, {}", row.panel.curve_name(curve), row.unit);
+                ui.label(mono(text).color(curve.color)).on_hover_text(said);
                 continue;
             }
             for (name, value, help) in [
@@ -65,6 +84,9 @@ impl Stack {
                 ("std", std, "Standard deviation of the visible samples"),
                 ("p-p", peak, "Peak to peak: largest minus smallest visible sample"),
             ] {
+                if !has_room(ui) {
+                    break;
+                }
                 ui.label(mono(format!("{name:<4}{:>10}", to_scale(value, scale)))).on_hover_text(help);
             }
         }
