@@ -1,6 +1,7 @@
 //! How quantities are named, scaled and shown.
 
 use crate::history::Channel;
+use crate::widgets::shown;
 
 /// Names of a robot's states, in the order of its matrices.
 pub(crate) const STATES: [&str; 4] = ["displacement", "velocity", "pitch", "pitch rate"];
@@ -32,10 +33,8 @@ impl Quantity {
             (Channel::LeftAngle, false) => Self::plain("left angle", "rad", 0.035),
             (Channel::RightAngle, true) => Self::in_degrees("right angle", "°", 2.0),
             (Channel::RightAngle, false) => Self::plain("right angle", "rad", 0.035),
-            (Channel::LeftSpeed, true) => Self::in_degrees("left speed", "°/s", 6.0),
-            (Channel::LeftSpeed, false) => Self::plain("left speed", "rad/s", 0.1),
-            (Channel::RightSpeed, true) => Self::in_degrees("right speed", "°/s", 6.0),
-            (Channel::RightSpeed, false) => Self::plain("right speed", "rad/s", 0.1),
+            (Channel::LeftSpeed, _) => Self::shaft_speed("left speed", degrees),
+            (Channel::RightSpeed, _) => Self::shaft_speed("right speed", degrees),
             (Channel::LeftTorque, _) => Self::plain("left torque", "N m", 0.01),
             (Channel::RightTorque, _) => Self::plain("right torque", "N m", 0.01),
         }
@@ -46,6 +45,11 @@ impl Quantity {
         Self { name, unit, scale: 1.0, min_span }
     }
 
+    /// A speed of a shaft that no log of a robot has.
+    pub(crate) const fn shaft_speed(name: &'static str, degrees: bool) -> Self {
+        if degrees { Self::in_degrees(name, "°/s", 6.0) } else { Self::plain(name, "rad/s", 0.1) }
+    }
+
     const fn in_degrees(name: &'static str, unit: &'static str, min_span: f64) -> Self {
         Self { name, unit, scale: 180.0 / std::f64::consts::PI, min_span }
     }
@@ -53,6 +57,15 @@ impl Quantity {
     /// Name and unit, for an axis.
     pub(crate) fn label(&self) -> String {
         format!("{} [{}]", self.name, self.unit)
+    }
+}
+
+/// An angle with its unit and three digits.
+pub(crate) fn angle(value_rad: f64, degrees: bool) -> String {
+    if degrees {
+        format!("{}°", shown(value_rad.to_degrees(), 3))
+    } else {
+        format!("{} rad", shown(value_rad, 3))
     }
 }
 

@@ -10,6 +10,7 @@ use super::{App, Saved};
 use crate::command::Command;
 use crate::document::{self, Base, Content, Document, Left, Opened};
 use crate::job::{Job, Outcome, Reporter, Waker};
+use crate::plot::{degrees, set_degrees};
 use crate::refine::RefineCommand;
 use crate::session::Session;
 use crate::write_file::write_file;
@@ -133,7 +134,7 @@ impl App {
             tab: Some(self.tab),
             dark: Some(ctx.global_style().visuals.dark_mode),
             zoom: Some(ctx.zoom_factor()),
-            degrees: Some(self.experiments.degrees()),
+            degrees: Some(degrees(ctx)),
             runs: Some(self.runs.ledger().clone()),
         }
     }
@@ -152,7 +153,7 @@ impl App {
             self.commands.send(Command::SetZoom(zoom));
         }
         if let Some(degrees) = document.degrees {
-            self.experiments.set_degrees(degrees);
+            set_degrees(ctx, degrees);
         }
         if let Some(map) = &document.column_map {
             self.friction.suggest_column_map(map);

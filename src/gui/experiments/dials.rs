@@ -4,6 +4,7 @@ use egui::{Align2, Color32, FontId, Sense, Stroke, Ui, Vec2, pos2, vec2};
 
 use super::run::Recorded;
 use super::scene::spoke;
+use crate::plot::{Unit, UnitChoice};
 use crate::quantity::to_scale;
 
 /// Dials larger than this show no more.
@@ -31,6 +32,7 @@ impl Dials<'_> {
         let ink = ui.visuals().text_color();
         let radius = (0.36 * rect.height() - 6.0).min(0.2 * rect.width()).max(1.0);
         let count = self.speeds.len() as f32;
+        let (unit, scale) = Unit::AngularSpeed.shown(UnitChoice::of(ui.ctx()));
         for (place, ((name, column), angle)) in self.speeds.iter().zip(angles).enumerate() {
             let x = rect.left() + rect.width() * (place as f32 + 0.5) / count;
             let center = pos2(x, rect.center().y - 4.0);
@@ -41,7 +43,7 @@ impl Dials<'_> {
             }
             painter.line_segment([center, center + spoke(0.85 * radius, angle)], Stroke::new(2.5, ink));
             let speed = self.run.columns[*column].get(index).copied().unwrap_or(f64::NAN);
-            let text = format!("{name} {} rad/s", to_scale(speed, 0.1));
+            let text = format!("{name} {} {unit}", to_scale(scale * speed, 0.1 * scale));
             let below = pos2(x, rect.bottom() - 5.0);
             painter.text(below, Align2::CENTER_BOTTOM, text, FontId::proportional(11.5), ink);
         }

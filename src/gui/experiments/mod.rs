@@ -110,14 +110,6 @@ impl ExperimentsTab {
         Ok(())
     }
 
-    pub(crate) fn degrees(&self) -> bool {
-        self.plots.stack.units.degrees
-    }
-
-    pub(crate) fn set_degrees(&mut self, degrees: bool) {
-        self.plots.stack.units.degrees = degrees;
-    }
-
     /// Starts both runs on `model`, which `path` holds if it is saved.
     pub(crate) fn start(&mut self, model: Model, path: Option<PathBuf>, waker: &Waker) -> Result<(), String> {
         self.saver.form.problem = None;
@@ -317,7 +309,7 @@ impl ExperimentsTab {
         }
         let tables = ui.scope(|ui| {
             table::tracking_ui(ui, comparison);
-            self.table.ui(ui, comparison, self.plots.stack.units.degrees, &self.marks);
+            self.table.ui(ui, comparison, &self.marks);
         });
         self.table_height = tables.response.rect.height() + spacing;
     }

@@ -21,9 +21,7 @@ pub(super) struct Plots {
 
 impl Default for Plots {
     fn default() -> Self {
-        let mut stack = Stack::new("runs", 60.0);
-        stack.units.degrees = false;
-        Self { stack }
+        Self { stack: Stack::new("runs", 60.0) }
     }
 }
 

@@ -6,6 +6,7 @@ use flqr_core::simulate::{Ground, Pose};
 
 use super::run::Recorded;
 use super::scene::{Camera, Figure, Subject, outline, robot_height_m, ruler, spoke};
+use crate::plot::degrees;
 use crate::theme::palette;
 
 /// Most points of the axle's way that are drawn.
@@ -181,8 +182,13 @@ impl Scene {
             let place = name.right_top() + egui::vec2(8.0, 0.0);
             self.painter.text(place, Align2::LEFT_TOP, "fallen", FontId::proportional(13.0), error);
         }
+        let degrees = degrees(self.painter.ctx());
         let angle = |name: &str, value: f64, decimals: usize| {
-            format!("{name} {}°", signed(value.to_degrees(), decimals))
+            if degrees {
+                format!("{name} {}°", signed(value.to_degrees(), decimals))
+            } else {
+                format!("{name} {} rad", signed(value, decimals + 2))
+            }
         };
         let first =
             format!("x {} m   {}", signed(pose.state.x_m, 3), angle("pitch", pose.state.pitch_rad, 2));

@@ -32,7 +32,7 @@ pub(super) fn signals(on_ground: bool, shafts: usize, degrees: bool) -> Vec<Sign
     }
     let speed = |key, name| Signal {
         key,
-        quantity: Quantity::plain(name, "rad/s", 0.1),
+        quantity: Quantity::shaft_speed(name, degrees),
         unit: Unit::AngularSpeed,
         has_target: true,
     };

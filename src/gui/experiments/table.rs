@@ -5,7 +5,7 @@ use flqr_core::simulate::{StepResponse, Summary};
 
 use super::run::Variant;
 use super::runs::Comparison;
-use crate::plot::Marks;
+use crate::plot::{Marks, Unit, UnitChoice, degrees};
 use crate::quantity::{Quantity, to_scale};
 use crate::theme::palette;
 use crate::widgets::{choice_ui, hint_ui, mono, number_ui, section_ui, shown};
@@ -55,7 +55,7 @@ impl StatisticsTable {
         &self.found
     }
 
-    pub(super) fn ui(&mut self, ui: &mut Ui, comparison: &Comparison, degrees: bool, marks: &Marks) {
+    pub(super) fn ui(&mut self, ui: &mut Ui, comparison: &Comparison, marks: &Marks) {
         section_ui(ui, "Statistics", |_| {});
         self.choice_ui(ui, comparison, marks);
         let statistics = self.statistics(comparison, marks.range);
@@ -69,7 +69,7 @@ impl StatisticsTable {
             if statistics.iter().all(Option::is_none) {
                 return;
             }
-            for (index, signal) in comparison.signals(degrees).iter().enumerate() {
+            for (index, signal) in comparison.signals(degrees(ui.ctx())).iter().enumerate() {
                 let pair = [0, 1].map(|run: usize| statistics[run].as_ref().map(|found| found[index]));
                 rows_ui(ui, &signal.quantity, pair);
             }
@@ -125,25 +125,26 @@ pub(super) fn tracking_ui(ui: &mut Ui, comparison: &Comparison) {
             let name = if motors == 1 { "shaft" } else { ["left motor", "right motor"][motor] };
             ui.label(RichText::new(name).small().strong());
             ui.end_row();
-            for (name, value) in TRACKING {
+            for (name, unit, value) in TRACKING {
+                let (unit, scale) = unit.shown(UnitChoice::of(ui.ctx()));
                 let pair = responses.map(|motors| value(motors?.get(motor)?));
                 let factor = pair[0].zip(pair[1]).and_then(|(plain, compensated)| {
                     (compensated != 0.0).then(|| (plain / compensated).abs())
                 });
                 let text =
-                    |value: Option<f64>| Some(value.map_or_else(|| "never".to_owned(), |v| shown(v, 3)));
-                row_ui(ui, name, pair.map(text), factor);
+                    |value: Option<f64>| Some(value.map_or_else(|| "never".to_owned(), |v| shown(scale * v, 3)));
+                row_ui(ui, &format!("{name} [{unit}]"), pair.map(text), factor);
             }
         }
     });
 }
 
-type Measure = (&'static str, fn(&StepResponse) -> Option<f64>);
+type Measure = (&'static str, Unit, fn(&StepResponse) -> Option<f64>);
 
 const TRACKING: [Measure; 3] = [
-    ("rise time [s]", |response| response.rise_time_s),
-    ("overshoot [rad/s]", |response| Some(response.overshoot_rad_s)),
-    ("steady error [rad/s]", |response| Some(response.steady_error_rad_s)),
+    ("rise time", Unit::Plain("s"), |response| response.rise_time_s),
+    ("overshoot", Unit::AngularSpeed, |response| Some(response.overshoot_rad_s)),
+    ("steady error", Unit::AngularSpeed, |response| Some(response.steady_error_rad_s)),
 ];
 
 fn head_ui(ui: &mut Ui, comparison: &Comparison) {

@@ -30,4 +30,5 @@ pub use export::{FigureFile, FigureKind};
 pub use marks::{Marks, Moved};
 pub use stack::{Panel, PanelCurve, Stack, Wishes};
 pub use unit::{Unit, UnitChoice};
+pub(crate) use unit::{degrees, set_degrees};
 pub use view::TimeView;

@@ -1,5 +1,7 @@
 //! Units of plotted quantities, and the ones that the user has chosen to see.
 
+use egui::{Context, Id};
+
 /// What a quantity is measured in; values are in the core's unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Unit {
@@ -28,7 +30,38 @@ impl Default for UnitChoice {
     }
 }
 
+/// Whether angles are shown in degrees: one choice for all of the window, which its session keeps.
+pub(crate) fn degrees(ctx: &Context) -> bool {
+    ctx.data(|data| data.get_temp(degrees_id())).unwrap_or_else(|| UnitChoice::default().degrees)
+}
+
+/// Makes that choice.
+pub(crate) fn set_degrees(ctx: &Context, degrees: bool) {
+    ctx.data_mut(|data| data.insert_temp(degrees_id(), degrees));
+}
+
+fn degrees_id() -> Id {
+    Id::unique("degrees")
+}
+
+impl UnitChoice {
+    /// Torques, and angles as all of the window shows them.
+    pub(crate) fn of(ctx: &Context) -> Self {
+        Self { degrees: degrees(ctx), ..Self::default() }
+    }
+}
+
 impl Unit {
+    /// The unit of this name, with what it can be shown in.
+    pub(crate) fn named(unit: &'static str) -> Self {
+        match unit {
+            "rad" => Self::Angle,
+            "rad/s" => Self::AngularSpeed,
+            "N m" => Self::Torque(None),
+            _ => Self::Plain(unit),
+        }
+    }
+
     /// The shown unit, and the factor from the core's unit to it.
     pub fn shown(self, choice: UnitChoice) -> (&'static str, f64) {
         let degrees = 1.0_f64.to_degrees();

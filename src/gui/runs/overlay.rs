@@ -9,7 +9,7 @@ use flqr_core::record::{Signal, best_alignment, first_crossing_s};
 use super::run::{Ledger, Run, RunKind, Series};
 use crate::command::Commands;
 use crate::job::{Job, Outcome, Waker};
-use crate::plot::{Data, Panel, PanelCurve, Stack, Unit};
+use crate::plot::{Data, Panel, PanelCurve, Stack, Unit, UnitChoice};
 use crate::theme::palette;
 use crate::widgets::{choice_ui, hint_ui, mono, number_ui, section_ui, shown, warning_ui};
 
@@ -25,6 +25,9 @@ const ROW_HEIGHT: f32 = 24.0;
 /// Number of a row and what to add to its times, s; none where it has no shape.
 type Found = Vec<(u64, Option<f64>)>;
 
+/// Name of a channel and the core's unit of it.
+type Named = (&'static str, &'static str);
+
 /// How the rows are drawn.
 pub(super) struct Overlay {
     stack: Stack,
@@ -32,11 +35,12 @@ pub(super) struct Overlay {
     curves: BTreeMap<u64, Curve>,
     /// Curves that were made.
     made: u64,
-    channel: String,
+    /// Name and unit of what is drawn.
+    channel: Named,
     shifts_s: BTreeMap<u64, f64>,
     /// The row that a drag moves; none: the view.
     dragged: Option<u64>,
-    /// Level of the event, in the channel's unit.
+    /// Level of the event, in the core's unit.
     level: f64,
     job: Option<Job<(), Found>>,
     problem: Option<String>,
@@ -48,7 +52,7 @@ impl Default for Overlay {
             stack: Stack::new("overlay", 60.0),
             curves: BTreeMap::new(),
             made: 0,
-            channel: String::new(),
+            channel: Named::default(),
             shifts_s: BTreeMap::new(),
             dragged: None,
             level: 0.0,
@@ -148,7 +152,7 @@ impl Overlay {
         self.drain();
         let names = channels(ledger, ticked);
         if !names.contains(&self.channel) {
-            self.channel = names.first().cloned().unwrap_or_default();
+            self.channel = names.first().copied().unwrap_or_default();
         }
         let drawn = self.drawn(ledger, ticked, ui);
         section_ui(ui, "Ticked runs", |ui| self.head_ui(&drawn, &names, ui));
@@ -175,14 +179,14 @@ impl Overlay {
         let rows = ticked.iter().filter_map(|number| ledger.row(*number));
         rows.filter_map(|run| {
             let series = run.series.as_ref().filter(|series| !series.time_s.is_empty())?;
-            let channel = series.channels.iter().position(|channel| label(channel) == self.channel)?;
+            let channel = series.channels.iter().position(|channel| named(channel) == self.channel)?;
             Some(Drawn { run, series, channel, color: color(ui, ticked, run.number) })
         })
         .collect()
     }
 
     /// From the right to the left.
-    fn head_ui(&mut self, drawn: &[Drawn<'_>], names: &[String], ui: &mut Ui) {
+    fn head_ui(&mut self, drawn: &[Drawn<'_>], names: &[Named], ui: &mut Ui) {
         let several = drawn.len() > 1 && self.job.is_none();
         let reset = ui.add_enabled(!self.shifts_s.is_empty(), Button::new("No shift"));
         if reset.on_hover_text("Every run at its own times again").clicked() {
@@ -195,8 +199,12 @@ impl Overlay {
         {
             self.align_at_event(drawn);
         }
-        number_ui(ui, &mut self.level, "event level", 46.0)
-            .on_hover_text("Level of the event, in the unit of the curve");
+        let (unit, scale) = shown_unit(self.channel, ui);
+        let mut level = scale * self.level;
+        number_ui(ui, &mut level, "event level", 46.0).on_hover_text(format!("Level of the event, {unit}"));
+        if level != scale * self.level {
+            self.level = level / scale;
+        }
         let correlation = ui.add_enabled(several, Button::new("By shape"));
         let help = "Shift so that each correlates most with the first row";
         if correlation.on_hover_text(help).clicked() {
@@ -204,10 +212,10 @@ impl Overlay {
         }
         ui.label("align");
         ui.separator();
-        let combo = ComboBox::from_id_salt("channel").selected_text(&self.channel).width(140.0);
+        let combo = ComboBox::from_id_salt("channel").selected_text(label(self.channel, ui)).width(140.0);
         let combo = combo.show_ui(ui, |ui| {
             for name in names {
-                ui.selectable_value(&mut self.channel, name.clone(), name);
+                ui.selectable_value(&mut self.channel, *name, label(*name, ui));
             }
         });
         combo.response.accessible_name("curve to compare").on_hover_text("What is drawn of the ticked rows");
@@ -300,7 +308,7 @@ impl Overlay {
         let Some(channel) = drawn.first().map(Drawn::channel) else { return };
         let panel = Panel {
             name: channel.name.into(),
-            unit: Unit::Plain(channel.unit),
+            unit: Unit::named(channel.unit),
             min_span: 1e-6,
             shown: true,
             curves: drawn.iter().filter_map(panel_curve).collect(),
@@ -369,8 +377,9 @@ impl Overlay {
         if shift_s != before {
             self.shifts_s.insert(number, shift_s);
         }
+        let (_, scale) = shown_unit(self.channel, ui);
         for value in self.curves.get(&number).map_or([f64::NAN; 4], |curve| curve.statistics) {
-            ui.label(mono(shown(value, 4)));
+            ui.label(mono(shown(scale * value, 4)));
         }
         ui.label(mono(shown(row.series.time_s.last().copied().unwrap_or(f64::NAN), 4)));
     }
@@ -387,15 +396,24 @@ fn statistics(values: &[f64]) -> [f64; 4] {
     [smallest, none_is_nan(finite().fold(f64::NEG_INFINITY, f64::max)), mean, square.sqrt()]
 }
 
-fn label(channel: &super::Channel) -> String {
-    format!("{} [{}]", channel.name, channel.unit)
+fn named(channel: &super::Channel) -> Named {
+    (channel.name, channel.unit)
+}
+
+/// The shown unit of a channel, and the factor from the core's unit to it.
+fn shown_unit((_, unit): Named, ui: &Ui) -> (&'static str, f64) {
+    Unit::named(unit).shown(UnitChoice::of(ui.ctx()))
+}
+
+fn label(channel: Named, ui: &Ui) -> String {
+    format!("{} [{}]", channel.0, shown_unit(channel, ui).0)
 }
 
 /// Names of all curves of the ticked rows, in their order.
-fn channels(ledger: &Ledger, ticked: &BTreeSet<u64>) -> Vec<String> {
+fn channels(ledger: &Ledger, ticked: &BTreeSet<u64>) -> Vec<Named> {
     let mut names = Vec::new();
     let series = ticked.iter().filter_map(|number| ledger.row(*number)?.series.as_ref());
-    for name in series.flat_map(|series| series.channels.iter().map(label)) {
+    for name in series.flat_map(|series| series.channels.iter().map(named)) {
         if !names.contains(&name) {
             names.push(name);
         }

@@ -315,6 +315,30 @@ fn effects_of_the_model_are_seen_switched_and_taken_out_with_undo() {
 }
 
 #[test]
+fn one_choice_of_degrees_or_radians_is_for_all_pages_and_the_session_keeps_it() {
+    let folder = Folder::new("angles");
+    let mut window = open(folder.options(), SIZE);
+    window.get_by_label_contains("plot of pitch [°]");
+    click(&mut window, "rad");
+    window.get_by_label_contains("plot of pitch [rad]");
+    let weight = pitch_weight(&window);
+    enter(&mut window, "pitch deviation", "0.05");
+    assert!((pitch_weight(&window) - 400.0).abs() < 1e-9, "{weight} to {}", pitch_weight(&window));
+    click(&mut window, "Experiments");
+    enter(&mut window, "duration of the runs", "1");
+    keys(&mut window, Modifiers::COMMAND, Key::Enter);
+    until(&mut window, "the runs", |s| s["experiments_tab"]["runs"].as_array().map(Vec::len) == Some(2));
+    window.run_steps(2);
+    window.get_by_label_contains("plot of pitch [rad]");
+    click(&mut window, "deg");
+    window.get_by_label_contains("plot of pitch [°]");
+    click(&mut window, "Tune");
+    window.get_by_label_contains("plot of pitch [°]");
+    click(&mut window, "rad");
+    until_kept(&mut window, &folder.running(), "\"angles\": \"rad\"");
+}
+
+#[test]
 fn a_closed_window_leaves_its_layout_and_asks_nothing() {
     let folder = Folder::new("closed");
     {

@@ -9,7 +9,8 @@ use super::pole_plane::PolePlane;
 use super::trials::Trials;
 use crate::context::ViewContext;
 use crate::design::Designed;
-use crate::plot::Axes;
+use crate::plot::{Axes, Unit, UnitChoice, degrees};
+use crate::quantity::angle;
 use crate::theme::palette;
 use crate::widgets::{hint_ui, shown};
 
@@ -19,6 +20,8 @@ const POINTS: usize = 400;
 const LONGEST_S: f64 = 20.0;
 /// Widths of the page from which on there is room for another plot.
 const ROOM_FOR_MORE: f32 = 860.0;
+/// Room for the line before the numbers.
+const SEPARATOR: f32 = 24.0;
 /// Share of the limit from which on it is drawn.
 const NEAR_LIMIT: f64 = 0.4;
 
@@ -31,10 +34,11 @@ enum Shown {
 }
 
 impl Shown {
-    fn label(self) -> &'static str {
+    fn label(self, degrees: bool) -> &'static str {
         match self {
             Self::Displacement => "displacement [m]",
-            Self::Pitch => "pitch [°]",
+            Self::Pitch if degrees => "pitch [°]",
+            Self::Pitch => "pitch [rad]",
             Self::Torque => "motor torque [N m]",
         }
     }
@@ -51,9 +55,10 @@ impl Shown {
 /// A predicted response, ready for plotting.
 #[derive(Default)]
 struct Response {
-    of: Option<(Designed, Disturbance, f64)>,
+    of: Option<(Designed, Disturbance, f64, bool)>,
     displacement: Vec<PlotPoint>,
-    pitch_deg: Vec<PlotPoint>,
+    /// In the shown unit.
+    pitch: Vec<PlotPoint>,
     torque_nm: Vec<PlotPoint>,
     /// What a reader would measure.
     summary: String,
@@ -67,6 +72,8 @@ pub(super) struct Predicted {
     plane: PolePlane,
     /// What the first plot shows where there is no room for more.
     first: Shown,
+    /// Angles in degrees.
+    degrees: bool,
 }
 
 impl Default for Predicted {
@@ -76,6 +83,7 @@ impl Default for Predicted {
             other: Response::default(),
             plane: PolePlane::default(),
             first: Shown::Displacement,
+            degrees: true,
         }
     }
 }
@@ -94,9 +102,9 @@ impl Predicted {
         };
         let other = context.designer.different();
         let seconds = duration_s(&now).max(other.as_ref().map_or(0.0, duration_s));
-        self.now.update(&now, disturbance, seconds);
+        self.now.update(&now, disturbance, seconds, self.degrees);
         match other {
-            Some(other) => self.other.update(&other, disturbance, seconds),
+            Some(other) => self.other.update(&other, disturbance, seconds, self.degrees),
             None => self.other = Response::default(),
         }
     }
@@ -110,14 +118,15 @@ impl Predicted {
             ui.set_min_size(size);
             return;
         }
+        self.degrees = degrees(ui.ctx());
         self.update(context, trials.shown());
         let many = ui.available_width() >= ROOM_FOR_MORE;
         let text = self.text(context, trials);
         let beside = ui.horizontal(|ui| {
             self.head_ui(trials, many, ui);
-            ui.separator();
-            let fits = small_width(&text, ui) <= ui.available_width();
+            let fits = small_width(&text, ui) + SEPARATOR <= ui.available_width();
             if fits {
+                ui.separator();
                 summary_ui(&text, ui);
             }
             fits
@@ -164,11 +173,12 @@ impl Predicted {
 
     /// What the plots show, in words and numbers.
     fn text(&self, context: &ViewContext<'_>, trials: &Trials) -> String {
-        let (of, now) = (trials.shown_text(), &self.now.summary);
+        let (of, now) = (trials.shown_text(self.degrees), &self.now.summary);
         if self.other.summary.is_empty() {
             return format!("{of}: {now}");
         }
-        let [active, other] = [context.designer.active, context.designer.active.other()].map(|slot| slot.name());
+        let [active, other] =
+            [context.designer.active, context.designer.active.other()].map(|slot| slot.name());
         format!("{of}: {active} {now}; {other} {}", self.other.summary)
     }
 
@@ -183,7 +193,7 @@ impl Predicted {
         let colors = palette(ui.visuals());
         let legend =
             Legend::default().position(what.corner()).follow_insertion_order(true).background_alpha(0.6);
-        let mut plot = quiet_plot(ui, size, "time [s]", what.label());
+        let mut plot = quiet_plot(ui, size, "time [s]", what.label(self.degrees));
         if context.designer.different().is_some() {
             plot = plot.legend(legend);
         }
@@ -213,8 +223,8 @@ impl Predicted {
 }
 
 impl Response {
-    fn update(&mut self, designed: &Designed, disturbance: Disturbance, seconds: f64) {
-        let key = Some((*designed, disturbance, seconds));
+    fn update(&mut self, designed: &Designed, disturbance: Disturbance, seconds: f64, degrees: bool) {
+        let key = Some((*designed, disturbance, seconds, degrees));
         if self.of == key {
             return;
         }
@@ -223,16 +233,17 @@ impl Response {
         let initial = disturbance.state(&designed.parameters);
         let response = sampled_response(&model, gain, &designed.timing, &initial, seconds);
         self.displacement = thinned(&response, |index| response.states[index].x_m);
-        self.pitch_deg = thinned(&response, |index| response.states[index].pitch_rad.to_degrees());
+        let (_, scale) = Unit::Angle.shown(UnitChoice { degrees, ..UnitChoice::default() });
+        self.pitch = thinned(&response, |index| scale * response.states[index].pitch_rad);
         self.torque_nm = thinned(&response, |index| stronger(response.torque_nm[index]));
-        self.summary = summary(&response, disturbance);
+        self.summary = summary(&response, disturbance, degrees);
         self.poles = sampled_poles(&model, gain, &designed.timing);
     }
 
     fn points(&self, what: Shown) -> &[PlotPoint] {
         match what {
             Shown::Displacement => &self.displacement,
-            Shown::Pitch => &self.pitch_deg,
+            Shown::Pitch => &self.pitch,
             Shown::Torque => &self.torque_nm,
         }
     }
@@ -276,15 +287,15 @@ fn thinned(response: &SampledResponse, value: impl Fn(usize) -> f64) -> Vec<Plot
 }
 
 /// Largest pitch and torque, and when it is where it belongs, in one line.
-fn summary(response: &SampledResponse, disturbance: Disturbance) -> String {
+fn summary(response: &SampledResponse, disturbance: Disturbance, degrees: bool) -> String {
     if response.states.is_empty() {
         return "not analysed: its delay is too long".to_owned();
     }
     let largest = |value: &dyn Fn(&State) -> f64| {
         response.states.iter().fold(0.0, |peak: f64, state| peak.max(value(state).abs()))
     };
-    let pitch_deg = largest(&|state| state.pitch_rad).to_degrees();
-    let peak = format!("{}° and {} N m at most", shown(pitch_deg, 3), shown(response.peak_torque_nm(), 3));
+    let pitch = angle(largest(&|state| state.pitch_rad), degrees);
+    let peak = format!("{pitch} and {} N m at most", shown(response.peak_torque_nm(), 3));
     let x_m = largest(&|state| state.x_m);
     // What counts as arrived: 2 % of the step, or of the farthest it was driven off.
     let band_m = 0.02 * if let Disturbance::Step(step) = disturbance { step.abs() } else { x_m };

@@ -13,6 +13,8 @@ use super::verdict::Verdict;
 use crate::context::ViewContext;
 use crate::design::Designed;
 use crate::job::{Job, Outcome, Reporter, Waker};
+use crate::plot::{Unit, UnitChoice, degrees};
+use crate::quantity::angle;
 use crate::widgets::{error_ui, hint_ui, mono, number_ui, section_ui, shown, warning_ui};
 
 /// The peak is looked for over this time, s.
@@ -23,9 +25,8 @@ const ROOMY: f64 = 0.8;
 /// What is said of a kind of disturbance.
 struct Kind {
     name: &'static str,
-    unit: &'static str,
-    /// Size of the unit in SI.
-    unit_si: f64,
+    unit: Unit,
+    /// In SI.
     largest: f64,
     help: &'static str,
 }
@@ -33,22 +34,14 @@ struct Kind {
 const KINDS: [Kind; 3] = [
     Kind {
         name: "kick",
-        unit: "N s",
-        unit_si: 1.0,
+        unit: Unit::Plain("N s"),
         largest: 1e4,
         help: "A blow to the body's centre of mass: force times duration",
     },
-    Kind {
-        name: "lean",
-        unit: "°",
-        unit_si: std::f64::consts::PI / 180.0,
-        largest: 0.79,
-        help: "The body is let go at this pitch",
-    },
+    Kind { name: "lean", unit: Unit::Angle, largest: 0.79, help: "The body is let go at this pitch" },
     Kind {
         name: "step",
-        unit: "m",
-        unit_si: 1.0,
+        unit: Unit::Plain("m"),
         largest: 1e4,
         help: "The place to stand at jumps this far ahead",
     },
@@ -119,13 +112,11 @@ impl Trials {
     }
 
     /// What it is, in words.
-    pub(super) fn shown_text(&self) -> String {
-        let kind = &KINDS[self.shown];
-        let size = shown(self.shown().size() / kind.unit_si, 3);
+    pub(super) fn shown_text(&self, degrees: bool) -> String {
         match self.shown() {
-            Disturbance::Kick(_) => format!("after a kick of {size} N s"),
-            Disturbance::Pitch(_) => format!("let go at {size}°"),
-            Disturbance::Step(_) => format!("after a step of {size} m"),
+            Disturbance::Kick(size) => format!("after a kick of {} N s", shown(size, 3)),
+            Disturbance::Pitch(size) => format!("let go at {}", angle(size, degrees)),
+            Disturbance::Step(size) => format!("after a step of {} m", shown(size, 3)),
         }
     }
 
@@ -183,12 +174,13 @@ impl Trials {
         if choice.accessible_name(format!("show {}", kind.name)).on_hover_text(kind.help).clicked() {
             self.shown = index;
         }
-        let mut size = self.trials[index].size() / kind.unit_si;
+        let (unit, scale) = kind.unit.shown(UnitChoice::of(ui.ctx()));
+        let mut size = self.trials[index].size() * scale;
         let before = size;
         number_ui(ui, &mut size, &format!("{} size", kind.name), 44.0).on_hover_text(kind.help);
-        ui.label(RichText::new(kind.unit).small());
+        ui.label(RichText::new(unit).small());
         if size != before {
-            let size_si = (size * kind.unit_si).clamp(-kind.largest, kind.largest);
+            let size_si = (size / scale).clamp(-kind.largest, kind.largest);
             self.trials[index] = self.trials[index].of_size(size_si);
         }
     }
@@ -226,7 +218,7 @@ impl Trials {
     fn largest_ui(&self, ui: &mut Ui) {
         let text = match (&self.answer, &self.job) {
             (Some(Simulated { largest_pitch_rad: Some(pitch), .. }), _) => {
-                format!("Gets up from a lean of {}° at most.", shown(pitch.to_degrees(), 3))
+                format!("Gets up from a lean of {} at most.", angle(*pitch, degrees(ui.ctx())))
             }
             (Some(_), _) => "The simulated robot did not take these values.".to_owned(),
             (None, Some(_)) => "Trying it on the simulated robot…".to_owned(),

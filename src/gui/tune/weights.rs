@@ -9,33 +9,31 @@ use super::matrices::matrices_ui;
 use crate::command::Command;
 use crate::context::ViewContext;
 use crate::log_slider::{HELP, log_slider_ui};
+use crate::plot::{Unit, UnitChoice};
 use crate::quantity::STATES;
 use crate::widgets::{choice_ui, hint_ui, number_ui, section_ui};
 
 /// What one weight is about.
 struct Row {
     name: &'static str,
-    /// Unit of the deviation, and its size in SI.
-    unit: &'static str,
-    unit_si: f64,
+    /// Unit of the deviation.
+    unit: Unit,
     help: &'static str,
 }
 
 /// Range of the sliders; fields take any number.
 const SLIDERS: RangeInclusive<f64> = 1e-4..=1e4;
 
-const DEGREE: f64 = std::f64::consts::PI / 180.0;
-
 const Q_ROWS: [Row; 4] = [
-    Row { name: STATES[0], unit: "m", unit_si: 1.0, help: "Q₁₁, 1/m²" },
-    Row { name: STATES[1], unit: "m/s", unit_si: 1.0, help: "Q₂₂, s²/m²" },
-    Row { name: STATES[2], unit: "°", unit_si: DEGREE, help: "Q₃₃, 1/rad²" },
-    Row { name: STATES[3], unit: "°/s", unit_si: DEGREE, help: "Q₄₄, s²/rad²" },
+    Row { name: STATES[0], unit: Unit::Plain("m"), help: "Q₁₁, 1/m²" },
+    Row { name: STATES[1], unit: Unit::Plain("m/s"), help: "Q₂₂, s²/m²" },
+    Row { name: STATES[2], unit: Unit::Angle, help: "Q₃₃, 1/rad²" },
+    Row { name: STATES[3], unit: Unit::AngularSpeed, help: "Q₄₄, s²/rad²" },
 ];
 
 const R_ROWS: [Row; 2] = [
-    Row { name: "left torque", unit: "N m", unit_si: 1.0, help: "R₁₁, 1/(N m)²" },
-    Row { name: "right torque", unit: "N m", unit_si: 1.0, help: "R₂₂, 1/(N m)²" },
+    Row { name: "left torque", unit: Unit::Torque(None), help: "R₁₁, 1/(N m)²" },
+    Row { name: "right torque", unit: Unit::Torque(None), help: "R₂₂, 1/(N m)²" },
 ];
 
 /// Steps that are offered, from the right to the left as they are drawn.
@@ -179,7 +177,8 @@ fn link(weights: &mut Weights, old: [f64; 2]) {
 
 /// The deviation that counts as 1, as another way to say the weight.
 fn deviation_ui(ui: &mut Ui, row: &Row, weight: &mut f64) {
-    let before = 1.0 / weight.sqrt() / row.unit_si;
+    let (unit, scale) = row.unit.shown(UnitChoice::of(ui.ctx()));
+    let before = scale / weight.sqrt();
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 3.0;
         if !before.is_finite() {
@@ -192,9 +191,9 @@ fn deviation_ui(ui: &mut Ui, row: &Row, weight: &mut f64) {
             "The deviation of {} that counts as 1: weight = 1/deviation², in SI units",
             row.name
         ));
-        ui.label(egui::RichText::new(row.unit).small());
+        ui.label(egui::RichText::new(unit).small());
         if deviation != before && deviation > 0.0 {
-            *weight = (deviation * row.unit_si).powi(-2);
+            *weight = (scale / deviation).powi(2);
         }
     });
 }

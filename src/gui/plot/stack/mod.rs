@@ -16,7 +16,7 @@ use super::decimate::{Data, DecimationCache, Indexed};
 use super::export::{Export, FigureFile};
 use super::marks::{Marks, Moved};
 use super::spectra::Spectra;
-use super::unit::{Unit, UnitChoice};
+use super::unit::{Unit, UnitChoice, degrees};
 use super::view::TimeView;
 use crate::command::{Command, Commands, FilePurpose};
 
@@ -97,8 +97,8 @@ pub struct Stack {
     name: &'static str,
     /// The visible range.
     pub view: TimeView,
-    /// The units that are shown.
-    pub units: UnitChoice,
+    /// The units that are shown; degrees are all of the window's.
+    units: UnitChoice,
     /// Whether there is a newest sample to follow.
     is_live: bool,
     /// Label of the horizontal axis, and the column of it in an exported log.
@@ -204,6 +204,7 @@ impl Stack {
 
     /// The same with marks of the page, which the stack's own cursors come before.
     pub fn show_marked(&mut self, ui: &mut Ui, panels: &[Panel<'_>], marks: Option<&mut Marks>) -> Wishes {
+        self.units.degrees = degrees(ui.ctx());
         let asked = self.export.ui(ui, self.name);
         let said = self.export.drain(ui);
         let mut around =

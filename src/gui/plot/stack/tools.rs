@@ -8,7 +8,7 @@ use super::{Around, Panel, Stack};
 use crate::plot::cursors::Cursors;
 use crate::plot::export::FigureKind;
 use crate::plot::spectra::{Measure, Spectra};
-use crate::plot::unit::Unit;
+use crate::plot::unit::{Unit, degrees, set_degrees};
 use crate::widgets::choice_ui;
 
 impl Stack {
@@ -65,8 +65,14 @@ impl Stack {
         let has = |units: fn(&Unit) -> bool| panels.iter().any(|panel| units(&panel.unit));
         if has(|unit| matches!(unit, Unit::Angle | Unit::AngularSpeed)) {
             ui.scope(|ui| {
-                let choices = [(true, "deg", "Angles in degrees"), (false, "rad", "Angles in radians")];
-                choice_ui(ui, &mut self.units.degrees, &choices);
+                let choices = [
+                    (true, "deg", "Angles in degrees, on all pages"),
+                    (false, "rad", "Angles in radians, on all pages"),
+                ];
+                let mut shown = degrees(ui.ctx());
+                if choice_ui(ui, &mut shown, &choices) {
+                    set_degrees(ui.ctx(), shown);
+                }
             });
         }
         if has(|unit| matches!(unit, Unit::Torque(Some(_)))) {
