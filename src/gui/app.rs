@@ -379,9 +379,10 @@ impl App {
     }
 
     fn drain_jobs(&mut self) {
-        for message in
-            [self.friction.drain(), self.refine.drain(), self.experiments.drain()].into_iter().flatten()
-        {
+        for (severity, text) in [self.friction.drain(), self.refine.drain()].into_iter().flatten() {
+            self.messages.add(severity, text);
+        }
+        if let Some(message) = self.experiments.drain() {
             self.say(message);
         }
         for problem in self.runs.drain() {

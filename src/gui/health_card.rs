@@ -1,7 +1,7 @@
 //! What is wrong with data, in plain sentences with the mend.
 
 use egui::{ProgressBar, RichText, Ui};
-use flqr_core::record::{HealthFinding, Severity};
+use flqr_core::record::{HealthFinding, LineProblem, Log, Severity};
 
 use crate::load::{LoadedLog, Loader};
 use crate::theme::palette;
@@ -52,12 +52,21 @@ pub(crate) fn findings_ui<'a>(findings: impl IntoIterator<Item = &'a HealthFindi
             if !finding.column.is_empty() {
                 ui.label(RichText::new(&finding.column).small().monospace());
             }
-            ui.label(RichText::new(&finding.problem).small());
+            let text = RichText::new(&finding.problem).small();
+            ui.label(if finding.severity == Severity::Info { text } else { text.color(color) });
             if !finding.mend.is_empty() {
                 ui.label(RichText::new(format!("→ {}", finding.mend)).small().weak());
             }
         });
     }
+}
+
+/// The first rows and cells of a log that could not be used, in one line.
+pub(crate) fn unread_cells(log: &Log) -> Option<String> {
+    let first: Vec<String> = log.problems.iter().take(SHOWN_PROBLEMS).map(LineProblem::to_string).collect();
+    let more = log.problem_count - first.len();
+    let more = if more > 0 { format!("; and {more} more") } else { String::new() };
+    (!first.is_empty()).then(|| first.join("; ") + &more)
 }
 
 /// The first rows and cells that could not be used, where they are in the file.

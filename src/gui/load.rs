@@ -7,10 +7,11 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use flqr_core::record::{
-    ColumnMap, HealthFinding, Log, LogKind, ReadOptions, Severity, data_health, read_log, row_time_s,
+    self, ColumnMap, HealthFinding, Log, LogKind, ReadOptions, data_health, read_log, row_time_s,
 };
 
 use crate::job::{Job, Outcome, Reporter, Waker};
+use crate::messages::{Said, Severity};
 use crate::runs::Sources;
 use crate::widgets::shown;
 
@@ -97,7 +98,7 @@ impl Loader {
 
     /// The log of before stays until another one is complete.
     /// `place` is where the health of a log is seen.
-    pub(crate) fn drain(&mut self, place: &str) -> Option<String> {
+    pub(crate) fn drain(&mut self, place: &str) -> Option<Said> {
         let (progress, outcome) = self.job.as_mut()?.poll();
         self.progress = progress.last().copied().or(self.progress);
         let result = match outcome {
@@ -110,13 +111,13 @@ impl Loader {
         self.progress = None;
         Some(match result {
             Ok(loaded) => {
-                let text = loaded.sentence(place);
+                let said = loaded.sentence(place);
                 self.log = Some(loaded);
-                text
+                said
             }
             Err(problem) => {
                 self.problem = Some(problem.clone());
-                problem
+                (Severity::Error, problem)
             }
         })
     }
@@ -202,15 +203,16 @@ impl LoadedLog {
     }
 
     /// That it is loaded, and how much is wrong with it.
-    fn sentence(&self, place: &str) -> String {
+    fn sentence(&self, place: &str) -> Said {
         let (rows, path) = (self.log.rows(), self.path.display());
-        match self.health.iter().filter(|finding| finding.severity > Severity::Info).count() {
-            0 => format!("{rows} rows loaded from {path}."),
-            1 => format!("{rows} rows loaded with 1 health finding: see {place}. They are from {path}."),
-            count => {
-                format!("{rows} rows loaded with {count} health findings: see {place}. They are from {path}.")
-            }
+        let count = self.health.iter().filter(|finding| finding.severity > record::Severity::Info).count();
+        if count == 0 {
+            return (Severity::Note, format!("{rows} rows loaded from {path}."));
         }
+        let findings = if count == 1 { "finding" } else { "findings" };
+        let text =
+            format!("{rows} rows loaded with {count} health {findings}: see {place}. They are from {path}.");
+        (Severity::Warning, text)
     }
 
     /// Kind and size, in a line.

@@ -43,6 +43,9 @@ impl Severity {
     }
 }
 
+/// What is to be said, and how.
+pub(crate) type Said = (Severity, String);
+
 /// One message, and how often it came in a row.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Message {

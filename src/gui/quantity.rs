@@ -1,6 +1,9 @@
 //! How quantities are named, scaled and shown.
 
+use flqr_core::effects::name_and_unit;
+
 use crate::history::Channel;
+use crate::plot::Unit;
 use crate::widgets::shown;
 
 /// Names of a robot's states, in the order of its matrices.
@@ -60,6 +63,18 @@ impl Quantity {
     }
 }
 
+/// Name and unit of a log's column, as everywhere in the window; of another column its own name.
+pub(crate) fn of_column(key: &str) -> (String, Unit) {
+    let known = Channel::ALL.into_iter().find(|channel| channel.key() == key);
+    if let Some(Quantity { name, unit, .. }) = known.map(|channel| Quantity::of(channel, false)) {
+        return (name.to_owned(), Unit::named(unit));
+    }
+    match name_and_unit(key) {
+        (_, "1") => (key.to_owned(), Unit::Plain("")),
+        (name, unit) => (name.replace('_', " "), Unit::named(unit)),
+    }
+}
+
 /// An angle with its unit and three digits.
 pub(crate) fn angle(value_rad: f64, degrees: bool) -> String {
     if degrees {
@@ -89,6 +104,20 @@ pub(crate) fn to_scale(value: f64, scale: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn columns_have_the_names_and_units_of_their_quantities() {
+        for (key, name, unit) in [
+            ("x_m", "displacement", Unit::Plain("m")),
+            ("pitch_rad", "pitch", Unit::Angle),
+            ("torque_left_nm", "left torque", Unit::Torque(None)),
+            ("force_n", "force", Unit::Plain("N")),
+            ("motor_speed_rad_s", "motor speed", Unit::AngularSpeed),
+            ("remark", "remark", Unit::Plain("")),
+        ] {
+            assert_eq!(of_column(key), (name.to_owned(), unit), "{key}");
+        }
+    }
 
     #[test]
     fn numbers_have_three_digits_of_their_scale_and_stay_short() {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use egui::{ProgressBar, RichText, TextEdit, Ui};
 use flqr_core::friction::{Stribeck, StribeckParameters};
-use flqr_core::identify::{Bounds, FitOptions, FitProgress, FitReport, Method, Motor, fit};
+use flqr_core::identify::{Bounds, FitError, FitOptions, FitProgress, FitReport, Method, Motor, fit};
 use flqr_core::model_file::{AxisParameters, Model, Rig};
 use flqr_core::record::{Log, LogKind, Mapping};
 
@@ -13,8 +13,10 @@ use super::fitted::Fitted;
 use super::motion_chart::MotionChart;
 use crate::command::Command;
 use crate::context::ViewContext;
+use crate::health_card::unread_cells;
 use crate::job::{Job, Outcome, Waker};
 use crate::load::LoadedLog;
+use crate::messages::{Said, Severity};
 use crate::runs::{Run, RunKind, Sources, Value};
 use crate::widgets::{choice_ui, error_ui, hint_ui, section_ui, shown};
 
@@ -28,7 +30,7 @@ pub(super) struct Step {
 }
 
 /// The result and what it was made from, or why there is none.
-type Ended = Result<(FitReport, Sources), String>;
+type Ended = Result<(FitReport, Sources), Said>;
 
 /// Options, the running fit, and the last result.
 pub(super) struct FitRun {
@@ -53,7 +55,7 @@ pub(super) struct FitRun {
     pub(super) finished: Option<Run>,
     /// The row of the last fit.
     pub(super) row: Option<Run>,
-    problem: Option<String>,
+    problem: Option<Said>,
 }
 
 impl Default for FitRun {
@@ -117,6 +119,24 @@ fn fitting_model(kind: Option<LogKind>, model: Model) -> Option<Model> {
     (linear_model == (kind == Some(LogKind::LinearAxis))).then_some(model)
 }
 
+/// Whether there is a left and a right motor to choose from: in the log, or in the model beside the log of one.
+fn has_motors(kind: Option<LogKind>, rig: &Rig) -> bool {
+    match kind {
+        Some(LogKind::Robot) => true,
+        Some(LogKind::LinearAxis) => false,
+        Some(LogKind::Bench | LogKind::FrictionPairs) | None => matches!(rig, Rig::Robot(_)),
+    }
+}
+
+/// Why there is no fit, with the cells that the log lost where it lost any.
+fn refusal(error: &FitError, log: &Log) -> Said {
+    if matches!(error, FitError::Cancelled { .. }) {
+        return (Severity::Note, error.to_string());
+    }
+    let lost = unread_cells(log).map(|cells| format!(". Of the log, this was not read: {cells}"));
+    (Severity::Error, format!("{error}{}", lost.unwrap_or_default()))
+}
+
 impl FitRun {
     pub(super) fn is_running(&self) -> bool {
         self.job.is_some()
@@ -153,7 +173,7 @@ impl FitRun {
                 })
             };
             let report = fit(std::slice::from_ref(&*log), model.as_ref(), motor, &options, &mut watch)
-                .map_err(|error| error.to_string())?;
+                .map_err(|error| refusal(&error, &log))?;
             Ok((report, Sources::new(model.as_ref(), [&*log])))
         };
         self.job = Some(Job::start("fit", waker, work).map_err(|e| format!("No thread for the fit: {e}."))?);
@@ -197,7 +217,7 @@ impl FitRun {
         self.problem = None;
     }
 
-    pub(super) fn drain(&mut self) -> Option<String> {
+    pub(super) fn drain(&mut self) -> Option<Said> {
         let (steps, outcome) = self.job.as_mut()?.poll();
         for step in steps {
             self.note_step(step);
@@ -205,7 +225,7 @@ impl FitRun {
         let result = match outcome {
             Outcome::Running => return None,
             Outcome::Done(result) => result,
-            Outcome::Broken => Err("The fit failed: this is a defect of flqr.".to_owned()),
+            Outcome::Broken => Err((Severity::Error, "The fit failed: this is a defect of flqr.".to_owned())),
         };
         self.job = None;
         Some(match result {
@@ -216,7 +236,7 @@ impl FitRun {
                 self.finished = self.made_with.take().map(|made_with| made_with.row(&report, sources));
                 self.motion = MotionChart::new(&report);
                 self.report = Some(report);
-                text
+                (Severity::Note, text)
             }
             Err(problem) => {
                 self.problem = Some(problem.clone());
@@ -272,32 +292,45 @@ impl FitRun {
         });
         serde_json::json!({
             "running": self.is_running(),
-            "problem": self.problem,
+            "problem": self.problem.as_ref().map(|(_, text)| text),
             "iteration": self.last_step.map(|step| step.iteration),
             "parameters": parameters.map(serde_json::Value::Object),
             "rmse": self.report.as_ref().map(|report| report.rmse),
         })
     }
 
-    pub(super) fn options_ui(&mut self, context: &ViewContext<'_>, has_log: bool, ui: &mut Ui) {
+    pub(super) fn options_ui(&mut self, context: &ViewContext<'_>, loaded: Option<&LoadedLog>, ui: &mut Ui) {
         section_ui(ui, "Fit", |_| {});
+        let kind = loaded.and_then(|loaded| loaded.kind.as_ref().ok().copied());
+        let motors = has_motors(kind, &context.session.rig);
         ui.add_enabled_ui(!self.is_running(), |ui| {
-            egui::Grid::new("fit").num_columns(2).spacing([12.0, 4.0]).show(ui, |ui| self.choices_ui(ui));
+            let grid = egui::Grid::new("fit").num_columns(2).spacing([12.0, 4.0]);
+            grid.show(ui, |ui| self.choices_ui(motors, ui));
         });
         ui.add_space(2.0);
-        ui.horizontal(|ui| self.run_ui(context, has_log, ui));
-        if let Some(problem) = &self.problem {
-            error_ui(ui, problem);
+        ui.horizontal(|ui| self.run_ui(context, loaded.is_some(), ui));
+        match &self.problem {
+            Some((Severity::Note, text)) => {
+                hint_ui(ui, text);
+            }
+            Some((Severity::Warning | Severity::Error, text)) => {
+                error_ui(ui, text);
+            }
+            None => {}
         }
     }
 
-    fn choices_ui(&mut self, ui: &mut Ui) {
-        ui.label("motor");
-        ui.horizontal(|ui| {
-            let help = "Of a log of both motors, the one to fit; and the one whose curve is drawn beside it";
-            choice_ui(ui, &mut self.motor, &[(Motor::Left, "left", help), (Motor::Right, "right", help)]);
-        });
-        ui.end_row();
+    fn choices_ui(&mut self, motors: bool, ui: &mut Ui) {
+        if motors {
+            ui.label("motor");
+            ui.horizontal(|ui| {
+                let help =
+                    "Of a log of both motors, the one to fit; and the one whose curve is drawn beside it";
+                let choices = [(Motor::Left, "left", help), (Motor::Right, "right", help)];
+                choice_ui(ui, &mut self.motor, &choices);
+            });
+            ui.end_row();
+        }
         ui.label("method");
         ui.horizontal(|ui| {
             let choices = [

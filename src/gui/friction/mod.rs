@@ -18,6 +18,7 @@ use crate::command::FilePurpose;
 use crate::context::ViewContext;
 use crate::job::Waker;
 use crate::load::Loader;
+use crate::messages::Said;
 use crate::panes::{Pane, panes_ui};
 use crate::runs::{Run, RunsTab};
 use fit::FitRun;
@@ -120,7 +121,7 @@ impl FrictionTab {
     }
 
     /// Takes in what the workers have brought; a sentence if something ended.
-    pub(crate) fn drain(&mut self) -> Option<String> {
+    pub(crate) fn drain(&mut self) -> Option<Said> {
         let generation = |loader: &Loader| loader.log().map(|loaded| loaded.generation);
         let before = generation(&self.loader);
         let loaded = self.loader.drain("“Data health” on the Friction page");
@@ -152,7 +153,7 @@ impl FrictionTab {
             Part::Log => {
                 self.source.ui(context, &self.loader, ui);
                 source::health_ui(&self.loader, ui);
-                self.fit.options_ui(context, self.loader.log().is_some(), ui);
+                self.fit.options_ui(context, self.loader.log(), ui);
             }
             Part::Plots => self.plots_ui(context, ui),
             Part::Result => result::ui(context, &self.fit, ui),

@@ -4,7 +4,8 @@ use egui::{ComboBox, RichText, ScrollArea, Ui};
 
 use crate::context::ViewContext;
 use crate::load::{LoadedLog, Loader};
-use crate::plot::{Data, Panel, PanelCurve, Stack, Unit};
+use crate::plot::{Data, Panel, PanelCurve, Stack, UnitChoice};
+use crate::quantity::of_column;
 use crate::runs::Run;
 use crate::theme::palette;
 use crate::widgets::{choice_ui, empty_page_ui, hint_ui, mono, section_ui, shown};
@@ -77,13 +78,16 @@ impl Preview {
             self.fitted_to = 0;
         }
         let column = self.column(loaded);
-        let name = &loaded.log.columns[column].name;
-        let combo = ComboBox::from_id_salt("column").selected_text(name).width(170.0).show_ui(ui, |ui| {
+        let key = &loaded.log.columns[column].name;
+        let combo = ComboBox::from_id_salt("column").selected_text(title(key, ui)).width(170.0);
+        let combo = combo.show_ui(ui, |ui| {
             for (index, column) in loaded.log.columns.iter().enumerate() {
-                ui.selectable_value(&mut self.column, Some(index), &column.name);
+                let choice = ui.selectable_value(&mut self.column, Some(index), title(&column.name, ui));
+                choice.on_hover_text(&column.name);
             }
         });
-        combo.response.on_hover_text("The column to show").accessible_name("column");
+        let help = format!("The quantity to show: now the column {key}");
+        combo.response.on_hover_text(help).accessible_name("column");
     }
 
     /// The chosen column, at first the one that matters for friction.
@@ -113,9 +117,10 @@ impl Preview {
             generation: (loaded.generation << 16) | column as u64,
             gap: loaded.axis.gap,
         };
+        let (name, unit) = of_column(&column_data.name);
         let panel = Panel {
-            name: (&column_data.name).into(),
-            unit: Unit::Plain(""),
+            name: name.into(),
+            unit,
             min_span: 1e-6,
             shown: true,
             curves: vec![curve],
@@ -123,6 +128,15 @@ impl Preview {
         };
         ui.horizontal_wrapped(|ui| self.stack.tools_ui(ui, std::slice::from_ref(&panel)));
         self.stack.show(ui, &[panel]).send(context.commands);
+    }
+}
+
+/// A column for people.
+fn title(key: &str, ui: &Ui) -> String {
+    let (name, unit) = of_column(key);
+    match unit.shown(UnitChoice::of(ui.ctx())).0 {
+        "" => name,
+        unit => format!("{name} [{unit}]"),
     }
 }
 

@@ -5,6 +5,7 @@ use flqr_core::identify::{Estimate, FitReport, StopReason};
 use flqr_core::record::Severity;
 
 use super::fit::FitRun;
+use super::fitted::Fitted;
 use crate::command::{Command, Target};
 use crate::context::ViewContext;
 use crate::widgets::{hint_ui, mono, section_ui, shown, warning_ui};
@@ -124,7 +125,8 @@ fn parameters_ui(report: &FitReport, held: bool, ui: &mut Ui) {
 fn use_ui(context: &ViewContext<'_>, fit: &FitRun, ui: &mut Ui) {
     section_ui(ui, "Use in the model", |_| {});
     let problem = fit.fitted().and_then(|fitted| fitted.check(&context.session.rig)).err();
-    let targets: &[(Target, &str)] = if context.session.robot().is_some() {
+    let linear = matches!(fit.fitted(), Ok(Fitted::Linear { .. }));
+    let targets: &[(Target, &str)] = if context.session.robot().is_some() && !linear {
         &[(Target::Left, "Left motor"), (Target::Right, "Right motor"), (Target::Both, "Both motors")]
     } else {
         &[(Target::Both, "Axis")]
@@ -139,6 +141,6 @@ fn use_ui(context: &ViewContext<'_>, fit: &FitRun, ui: &mut Ui) {
         }
     });
     if let Some(problem) = problem {
-        hint_ui(ui, problem);
+        warning_ui(ui, problem);
     }
 }

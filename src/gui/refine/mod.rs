@@ -25,6 +25,7 @@ use crate::column_map::ColumnMapForm;
 use crate::command::Command;
 use crate::context::ViewContext;
 use crate::job::Waker;
+use crate::messages::Said;
 use crate::panes::{Pane, panes_ui};
 use crate::runs::Run as LedgerRow;
 use crate::save_form::{FileKind, SaveForm};
@@ -288,9 +289,9 @@ impl RefineTab {
     }
 
     /// Takes in what the workers have brought; a sentence if something ended.
-    pub(crate) fn drain(&mut self) -> Option<String> {
+    pub(crate) fn drain(&mut self) -> Option<Said> {
         let loaded = self.sources.drain();
-        let Some(Drained { question, text, answered, records }) = self.run.drain() else { return loaded };
+        let Some(Drained { question, said, answered, records }) = self.run.drain() else { return loaded };
         if let Some(records) = records {
             self.sources.replace(records);
         }
@@ -308,7 +309,7 @@ impl RefineTab {
                 (Question::Refine | Question::Demo, _) => Step::Add,
             };
         }
-        Some(text)
+        Some(said)
     }
 
     /// A sentence when something was saved, or could not be.

@@ -14,6 +14,7 @@ use flqr_core::robot::Motor;
 use super::sources::Input;
 use crate::job::{Job, Outcome, Reporter, Waker};
 use crate::load::LoadedLog;
+use crate::messages::{Said, Severity};
 use crate::runs::Sources;
 use crate::shell_word::quoted;
 
@@ -149,7 +150,7 @@ struct Running {
 pub(super) struct Drained {
     pub(super) question: Question,
     /// A sentence about it.
-    pub(super) text: String,
+    pub(super) said: Said,
     /// Whether there is another answer.
     pub(super) answered: bool,
     /// What was recorded for it, where it was.
@@ -213,6 +214,7 @@ impl Run {
         let generation = self.generation;
         let answered = matches!(end, End::Answered(..));
         let mut records = None;
+        let severity = if matches!(end, End::Refused(_)) { Severity::Error } else { Severity::Note };
         let text = match end {
             End::Cancelled => "Cancelled: what was found before is still shown.".to_owned(),
             End::Refused(problem) => {
@@ -241,7 +243,7 @@ impl Run {
                 text
             }
         };
-        Some(Drained { question, text, answered, records })
+        Some(Drained { question, said: (severity, text), answered, records })
     }
 }
 

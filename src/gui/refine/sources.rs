@@ -13,6 +13,7 @@ use crate::context::ViewContext;
 use crate::health_card::progress_ui;
 use crate::job::Waker;
 use crate::load::{LoadedLog, Loader};
+use crate::messages::Said;
 use crate::widgets::{error_ui, hint_ui, section_ui, warning_ui};
 
 /// A log of the list.
@@ -133,7 +134,7 @@ impl Sources {
     }
 
     /// Takes in what the workers have brought; the last sentence if some have ended.
-    pub(super) fn drain(&mut self) -> Option<String> {
+    pub(super) fn drain(&mut self) -> Option<Said> {
         self.list
             .iter_mut()
             .filter_map(|source| source.loader.drain("the first step of the Refine page"))

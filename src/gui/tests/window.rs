@@ -61,11 +61,16 @@ fn a_drag_of_a_slider_changes_the_gains_while_it_lasts() {
 fn a_point_of_a_drag_and_an_arrow_are_a_percent_or_two_and_a_tenth_of_that_with_shift() {
     let mut window = open(options(Tab::Tune), SIZE);
     let weight = |window: &Window| state(window)["q_diagonal"][2].as_f64().unwrap();
-    let percent = |before: f64, after: f64, points: f64| 100.0 * ((after / before).powf(points.recip()) - 1.0);
+    let percent =
+        |before: f64, after: f64, points: f64| 100.0 * ((after / before).powf(points.recip()) - 1.0);
     let slider = window.get_by_label("pitch weight slider").rect();
     let before = weight(&window);
+    // The way to the slider is no part of the drag, though a slow frame brings it with the press.
+    window.hover_at(Pos2::new(700.0, 600.0));
+    window.step();
     window.drag_at(slider.center());
     window.step();
+    assert_eq!(weight(&window), before);
     // Far beyond the rail, so that all magnitudes are in reach of one drag.
     window.hover_at(slider.center() + vec2(300.0, 0.0));
     window.step();
@@ -348,14 +353,19 @@ fn carriage_csv(columns: &str) -> String {
 fn a_log_of_a_linear_axis_is_fitted_although_the_model_is_a_robot() {
     let log = TempFile::new("axis.csv", &carriage_csv("time_s,position_m,force_n"));
     let mut window = open(WindowOptions { log: Some(log.0.clone()), ..options(Tab::Friction) }, SIZE);
+    open(options(Tab::Friction), SIZE).get_by_label("motor");
     until(&mut window, "loading", |s| s["friction_tab"]["log"]["kind"] == "linear_axis");
+    window.run_steps(2);
+    window.get_by_label_contains("plot of force [N]");
+    assert!(window.query_by_label("motor").is_none(), "one carriage has no left and right");
     click(&mut window, "Start fit");
     let ended = until(&mut window, "the fit", |s| s["friction_tab"]["fit"]["running"] == false);
     let mass = ended["friction_tab"]["fit"]["parameters"]["mass_kg"]["value"].as_f64();
     assert!(mass.is_some_and(|mass| (mass - 20.0).abs() < 0.4), "{ended:#}");
     window.get_by_label_contains("open the model of a linear axis");
     window.get_by_label_contains("means from peak to peak");
-    click(&mut window, "Both motors");
+    assert!(window.query_by_label("Both motors").is_none(), "a carriage is no motor");
+    click(&mut window, "Axis");
     assert_eq!(state(&window)["friction"], ended["friction"], "newtons are no torque");
 }
 
@@ -410,6 +420,44 @@ fn a_fit_of_a_motor_is_refused_by_a_linear_axis() {
     let after = state(&window);
     assert!(after["friction"][0].is_null(), "{after:#}");
     assert_eq!(after["unsaved_changes"], false);
+}
+
+#[test]
+fn a_fit_of_a_torque_that_never_changes_is_refused_in_one_sentence() {
+    let dead: String = pairs_csv()
+        .lines()
+        .map(|line| match line.split_once(',') {
+            Some((speed, "torque_nm")) => format!("{speed},torque_nm\n"),
+            Some((speed, _)) => format!("{speed},0.25\n"),
+            None => panic!("{line}"),
+        })
+        .collect();
+    let log = TempFile::new("dead.csv", &dead);
+    let mut window = open(WindowOptions { log: Some(log.0.clone()), ..options(Tab::Friction) }, SIZE);
+    until(&mut window, "loading", |s| s["friction_tab"]["log"]["rows"] == 80);
+    click(&mut window, "Start fit");
+    let refused = until(&mut window, "the refusal", |s| s["friction_tab"]["fit"]["problem"].is_string());
+    let problem = refused["friction_tab"]["fit"]["problem"].as_str().unwrap();
+    assert!(problem.contains(log.name()) && problem.contains("0.25 N m"), "{problem}");
+    assert!(!problem.contains("inf") && !problem.contains("NaN"), "{problem}");
+    assert_eq!(refused["message"], problem);
+    assert!(refused["friction_tab"]["fit"]["parameters"].is_null(), "{refused:#}");
+    assert_eq!(window.get_all_by_label(problem).count(), 2, "on the page, and in the status line");
+    assert_eq!(refused["friction"], state(&window)["friction"]);
+}
+
+#[test]
+fn a_refused_fit_names_the_cells_that_were_not_read() {
+    let rows: String = (0..4).map(|row| format!("{row},{}\n", f64::from(row) * 0.1)).collect();
+    let log = TempFile::new("cells.csv", &format!("speed_rad_s,torque_nm\n{rows}5,high\n6,?\n"));
+    let mut window = open(WindowOptions { log: Some(log.0.clone()), ..options(Tab::Friction) }, SIZE);
+    until(&mut window, "loading", |s| s["friction_tab"]["log"]["rows"] == 4);
+    click(&mut window, "Start fit");
+    let refused = until(&mut window, "the refusal", |s| s["friction_tab"]["fit"]["problem"].is_string());
+    let problem = refused["friction_tab"]["fit"]["problem"].as_str().unwrap();
+    for cell in ["line 6, column `torque_nm`: `high`", "line 7, column `torque_nm`: `?`"] {
+        assert!(problem.contains(cell), "{problem}");
+    }
 }
 
 #[test]
