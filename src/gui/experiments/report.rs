@@ -8,6 +8,7 @@ use super::run::{Recorded, Variant};
 use super::runs::Comparison;
 use super::signals::Signal;
 use super::table::factor;
+use crate::quantity::MOTORS;
 
 /// The whole report; statistics over `range_s`.
 pub(super) fn document(comparison: &Comparison, range_s: [f64; 2]) -> Document {
@@ -123,11 +124,7 @@ fn tracking(comparison: &Comparison) -> Option<Table> {
         for (motor, response) in run.tracking()?.iter().enumerate() {
             let rise = response.rise_time_s;
             rows.push(vec![
-                Cell::text(format!(
-                    "{}, {}",
-                    variant.title(comparison.settings.scenario),
-                    ["left", "right"][motor]
-                )),
+                Cell::text(format!("{}, {}", variant.title(comparison.settings.scenario), MOTORS[motor])),
                 rise.map_or_else(|| Cell::text("never"), |time| Cell::significant(time, 3)),
                 Cell::significant(response.overshoot_rad_s, 3),
                 Cell::significant(response.steady_error_rad_s, 3),

@@ -6,7 +6,7 @@ use flqr_core::simulate::{StepResponse, Summary};
 use super::run::Variant;
 use super::runs::Comparison;
 use crate::plot::{Marks, Unit, UnitChoice, degrees};
-use crate::quantity::{Quantity, to_scale};
+use crate::quantity::{MOTORS, Quantity, to_scale};
 use crate::theme::palette;
 use crate::widgets::{choice_ui, hint_ui, mono, number_ui, section_ui, shown};
 
@@ -121,8 +121,8 @@ pub(super) fn tracking_ui(ui: &mut Ui, comparison: &Comparison) {
     let grid = Grid::new("tracking").num_columns(4).striped(true).min_row_height(15.0);
     grid.spacing([13.0, 2.0]).show(ui, |ui| {
         head_ui(ui, comparison);
-        for motor in 0..motors {
-            let name = if motors == 1 { "shaft" } else { ["left motor", "right motor"][motor] };
+        for (motor, side) in MOTORS.into_iter().enumerate().take(motors) {
+            let name = if motors == 1 { "shaft".to_owned() } else { format!("{side} motor") };
             ui.label(RichText::new(name).small().strong());
             ui.end_row();
             for (name, unit, value) in TRACKING {
@@ -131,8 +131,9 @@ pub(super) fn tracking_ui(ui: &mut Ui, comparison: &Comparison) {
                 let factor = pair[0].zip(pair[1]).and_then(|(plain, compensated)| {
                     (compensated != 0.0).then(|| (plain / compensated).abs())
                 });
-                let text =
-                    |value: Option<f64>| Some(value.map_or_else(|| "never".to_owned(), |v| shown(scale * v, 3)));
+                let text = |value: Option<f64>| {
+                    Some(value.map_or_else(|| "never".to_owned(), |v| shown(scale * v, 3)))
+                };
                 row_ui(ui, &format!("{name} [{unit}]"), pair.map(text), factor);
             }
         }

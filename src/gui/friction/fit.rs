@@ -17,6 +17,7 @@ use crate::health_card::unread_cells;
 use crate::job::{Job, Outcome, Waker};
 use crate::load::LoadedLog;
 use crate::messages::{Said, Severity};
+use crate::quantity::MOTORS;
 use crate::runs::{Run, RunKind, Sources, Value};
 use crate::widgets::{choice_ui, error_ui, hint_ui, section_ui, shown};
 
@@ -96,7 +97,7 @@ impl MadeWith {
         let name = Path::new(&log.source)
             .file_name()
             .map_or(log.source.as_str().into(), |name| name.to_string_lossy());
-        let motor = if *motor == Motor::Left { "left" } else { "right" };
+        let motor = MOTORS[*motor as usize];
         let method = if options.method == Method::Best { "best" } else { "pso" };
         let mut row = Run::new(RunKind::Fit, format!("friction, {motor}, {name}"), model.as_ref(), sources)
             .with("fit.log", Value::Text(log.source.clone()))

@@ -10,6 +10,7 @@ use flqr_core::robot::RobotParameters;
 
 use crate::command::Command;
 use crate::context::ViewContext;
+use crate::quantity::MOTORS;
 use crate::session::Session;
 use crate::widgets::{error_ui, hint_ui, number_ui, section_ui};
 
@@ -130,7 +131,7 @@ impl ParameterEditor {
         let before = self.friction;
         Grid::new("friction").num_columns(3).spacing([6.0, 3.0]).show(ui, |ui| {
             ui.label("");
-            for (motor, name) in ["left", "right"].into_iter().enumerate() {
+            for (motor, name) in MOTORS.into_iter().enumerate() {
                 let mut present = self.friction[motor].is_some();
                 let help = format!("Whether the {name} motor has friction");
                 if ui.checkbox(&mut present, name).on_hover_text(help).changed() {
@@ -140,7 +141,7 @@ impl ParameterEditor {
             ui.end_row();
             for (_, name, unit, help, value) in FRICTION_FIELDS {
                 ui.label(name).on_hover_text(format!("{help} [{unit}]"));
-                for (motor, side) in ["left", "right"].into_iter().enumerate() {
+                for (motor, side) in MOTORS.into_iter().enumerate() {
                     match &mut self.friction[motor] {
                         Some(curve) => {
                             let accessible = format!("{name} friction {side}");
@@ -161,7 +162,7 @@ impl ParameterEditor {
 
     fn send_friction(&self, context: &ViewContext<'_>, ui: &mut Ui, before: [Option<StribeckParameters>; 2]) {
         let curves = self.friction.map(|parameters| parameters.map(Stribeck::new));
-        for (curve, side) in curves.iter().zip(["left", "right"]) {
+        for (curve, side) in curves.iter().zip(MOTORS) {
             if let Some(Err(problem)) = curve {
                 error_ui(ui, format!("{side} motor: {problem}; the last good curve stays in force"));
             }
