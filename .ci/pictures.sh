@@ -16,7 +16,6 @@ out=$(mktemp -d)
 source "$(dirname "$0")/display.sh"
 model=$(realpath "$(dirname "$0")/../presets/paper.toml")
 zoom=${4:-0}
-scale=${WINIT_X11_SCALE_FACTOR:-1}
 
 # both NAME: the page as it is, dark and light.
 both() {
@@ -83,18 +82,8 @@ until_state 600 "the demonstration has an answer" '.refine_tab.refinement.effect
 both refine
 xdotool key ctrl+6
 until_state 20 "the page of runs is there" '.tab == "runs"'
-if [ "$zoom" = 0 ]; then
-    # The boxes of the second and the third row: both runs of the experiment, below the refinement. At their places, as
-    # no key and no command ticks a row: where the table has moved, this fails below, with a picture of it.
-    for y in 151 176; do
-        # Below the window's title, 20 pixels at any scale.
-        xdotool mousemove $((20 * scale)) $((20 + (y - 20) * scale))
-        sleep 0.3
-        xdotool click 1
-        sleep 0.5
-    done
-    until_state 10 "two rows are ticked" '.runs_tab.shown | length == 2'
-fi
+by_name "overlay the last two runs"
+until_state 10 "two rows are ticked" '.runs_tab.shown | length == 2'
 both runs
 xdotool key ctrl+7
 until_state 20 "the page of messages is there" '.tab == "log"'

@@ -19,6 +19,7 @@ use crate::job::{Job, Outcome};
 use crate::layout::Layout;
 use crate::live::LiveCommand;
 use crate::refine::{RefineCommand, RefineFile, Surroundings};
+use crate::runs::RunsCommand;
 use crate::session::Session;
 use crate::tab::Tab;
 use crate::tour::Tour;
@@ -181,6 +182,9 @@ impl App {
             Command::ChooseRecording(path) => self.robot.note_recording_path(&path),
             Command::ChooseFigure(file, answer) => file.answer(ctx, answer),
             Command::Runs(command) => {
+                if matches!(command, RunsCommand::OverlayLast | RunsCommand::FocusRows) {
+                    self.commands.send(Command::SelectTab(Tab::Runs));
+                }
                 if let Some(text) = self.runs.apply(command, &self.waker) {
                     self.say(text);
                 }

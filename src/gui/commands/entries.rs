@@ -12,6 +12,7 @@ use crate::command::{Command, FilePurpose, Source, Target};
 use crate::layout::Side;
 use crate::plot::{FigureFile, FigureKind};
 use crate::refine::{Question, RefineCommand, RefineFile, SavedAs};
+use crate::runs::RunsCommand;
 use crate::tab::Tab;
 
 const fn ctrl(key: Key) -> KeyboardShortcut {
@@ -435,6 +436,28 @@ fn run() -> Vec<Entry> {
             &[],
             |_| Ok(Command::Refine(RefineCommand::Start(Question::Demo))),
         ),
+        entry(
+            menu,
+            "overlay-runs",
+            "Overlay the last two runs",
+            "Draw the last two runs of one kind over each other, on the Runs page",
+            &[],
+            |_| Ok(Command::Runs(RunsCommand::OverlayLast)),
+        )
+        .also("runs tick compare show draw"),
+        entry(
+            menu,
+            "rows",
+            "Go to the runs",
+            "The box of the newest row of the Runs page: arrows go on, Space ticks",
+            &[],
+            |_| Ok(Command::Runs(RunsCommand::FocusRows)),
+        )
+        .also("rows table focus"),
+        entry(menu, "untick-runs", "Untick all runs", "Draw none of the rows of the Runs page", &[], |_| {
+            Ok(Command::Runs(RunsCommand::UntickAll))
+        })
+        .also("runs clear"),
         entry(menu, "experiment", "Run or cancel the experiment", "Both controllers", &[], |s| {
             Ok(start_experiment(s))
         }),

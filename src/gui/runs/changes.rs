@@ -1,7 +1,6 @@
 //! What changed from one row to another.
 
 use std::collections::BTreeSet;
-use std::sync::Arc;
 
 use egui::{ComboBox, Grid, Label, RichText, ScrollArea, Ui};
 
@@ -43,14 +42,10 @@ fn usual(ledger: &Ledger, ticked: &BTreeSet<u64>) -> [Option<u64>; 2] {
     if let (2, Some(first), Some(last)) = (ticked.len(), ticked.first(), ticked.last()) {
         return [Some(*first), Some(*last)];
     }
-    let rows = ledger.rows();
-    let with_older = |(index, new): (usize, &Arc<Run>)| {
-        let old = rows[..index].iter().rev().find(|old| old.kind == new.kind)?;
-        Some([Some(old.number), Some(new.number)])
-    };
-    if let Some(alike) = rows.iter().enumerate().rev().find_map(with_older) {
-        return alike;
+    if let Some(alike) = ledger.last_alike(|_| true) {
+        return alike.map(Some);
     }
+    let rows = ledger.rows();
     [2, 1].map(|back| rows.len().checked_sub(back).map(|index| rows[index].number))
 }
 

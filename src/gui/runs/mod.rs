@@ -93,6 +93,23 @@ impl RunsTab {
         }
     }
 
+    /// Ticks the last two rows of one kind that have curves; a sentence where there are none.
+    fn overlay_last(&mut self, waker: &Waker) -> Option<String> {
+        let Some(numbers) = self.ledger.last_alike(Run::can_be_drawn) else {
+            return Some("There are no two runs of one kind with curves to draw over each other.".to_owned());
+        };
+        self.ticked.clear();
+        let mut problem = None;
+        for number in numbers {
+            if self.ledger.row(number).is_some_and(|row| row.series.is_some()) {
+                self.ticked.insert(number);
+            } else {
+                problem = self.read_curves(number, waker).or(problem);
+            }
+        }
+        problem
+    }
+
     /// The command that makes a row again.
     ///
     /// # Errors
@@ -110,6 +127,15 @@ impl RunsTab {
                 self.ticked.retain(|number| !numbers.contains(number));
                 let text = |deleted| format!("Deleted {}: Undo delete brings it back.", listed(deleted));
                 (!deleted.is_empty()).then(|| text(deleted))
+            }
+            RunsCommand::FocusRows => {
+                self.table.focus_first = true;
+                None
+            }
+            RunsCommand::OverlayLast => self.overlay_last(waker),
+            RunsCommand::UntickAll => {
+                self.ticked.clear();
+                None
             }
             RunsCommand::UndoDelete => {
                 let back = self.ledger.undo_delete()?;

@@ -166,6 +166,11 @@ impl Run {
         }
     }
 
+    /// Whether its curves are in memory, or in a file.
+    pub(super) fn can_be_drawn(&self) -> bool {
+        self.series.is_some() || self.file().is_some()
+    }
+
     /// What exports say of it, in one line.
     pub(crate) fn provenance(&self) -> String {
         let seed = self.seed.map(|seed| format!(", seed {seed}")).unwrap_or_default();
@@ -233,6 +238,15 @@ impl Ledger {
 
     pub(super) fn row_mut(&mut self, number: u64) -> Option<&mut Run> {
         self.rows.iter_mut().find(|run| run.number == number).map(Arc::make_mut)
+    }
+
+    /// The last two rows of one kind among those that are `wanted`, the older one first.
+    pub(super) fn last_alike(&self, wanted: impl Fn(&Run) -> bool) -> Option<[u64; 2]> {
+        let rows: Vec<&Run> = self.rows.iter().rev().map(|run| &**run).filter(|run| wanted(run)).collect();
+        rows.iter().enumerate().find_map(|(index, new)| {
+            let old = rows[index + 1..].iter().find(|old| old.kind == new.kind)?;
+            Some([old.number, new.number])
+        })
     }
 
     /// What the session's file keeps.

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use egui::{Button, Checkbox, Grid, Label, RichText, ScrollArea, Sense, TextEdit, Ui};
+use egui::{Button, Checkbox, Grid, Label, Response, RichText, ScrollArea, Sense, TextEdit, Ui};
 
 use super::run::{Ledger, Run, RunKind};
 use super::{RunsCommand, overlay};
@@ -30,6 +30,8 @@ const RESULT_WIDTH: [f32; 2] = [160.0, 620.0];
 #[derive(Default)]
 pub(super) struct RunTable {
     filter: String,
+    /// The first box is to take the keyboard.
+    pub(super) focus_first: bool,
     /// A note that is being typed.
     note: Option<(u64, String)>,
     /// Largest width that each column has had, so that they stay where they are when other rows come into view.
@@ -95,7 +97,7 @@ impl RunTable {
         &mut self,
         context: &ViewContext<'_>,
         ledger: &Ledger,
-        ticked: &mut BTreeSet<u64>,
+        ticked: &BTreeSet<u64>,
         can_undo: bool,
         ui: &mut Ui,
     ) {
@@ -116,7 +118,7 @@ impl RunTable {
         }
         let none = ui.add_enabled(!ticked.is_empty(), Button::new("Untick all"));
         if none.on_hover_text("Draw none of the rows").clicked() {
-            ticked.clear();
+            context.commands.send(Command::Runs(RunsCommand::UntickAll));
         }
         let field = TextEdit::singleline(&mut self.filter).hint_text("filter").desired_width(140.0);
         ui.add(field)
@@ -136,7 +138,10 @@ impl RunTable {
     fn row_ui(&mut self, context: &ViewContext<'_>, run: &Run, ticked: &mut BTreeSet<u64>, ui: &mut Ui) {
         let result = self.widths[RESULT];
         let hash = run.sources.get(..8).unwrap_or(&run.sources);
-        self.cell_ui(0, ui, |ui| tick_ui(context, run, ticked, ui));
+        let tick = self.cell_ui(0, ui, |ui| tick_ui(context, run, ticked, ui));
+        if tick.enabled() && std::mem::take(&mut self.focus_first) {
+            tick.request_focus();
+        }
         self.cell_ui(1, ui, |ui| number_ui(context, run.number, ui));
         self.cell_ui(2, ui, |ui| {
             ui.label(mono(clock(run.unix_s))).on_hover_text(format!("{} seconds since 1970", run.unix_s))
@@ -187,7 +192,7 @@ fn number_ui(context: &ViewContext<'_>, number: u64, ui: &mut Ui) {
 }
 
 /// Whether a row is drawn: offered only where that shows something.
-fn tick_ui(context: &ViewContext<'_>, run: &Run, ticked: &mut BTreeSet<u64>, ui: &mut Ui) {
+fn tick_ui(context: &ViewContext<'_>, run: &Run, ticked: &mut BTreeSet<u64>, ui: &mut Ui) -> Response {
     let number = run.number;
     let mut tick = ticked.contains(&number);
     let drawn = run.series.is_some();
@@ -202,9 +207,10 @@ fn tick_ui(context: &ViewContext<'_>, run: &Run, ticked: &mut BTreeSet<u64>, ui:
         }
     };
     outline_boxes(ui.visuals_mut());
-    let check = ui.add_enabled(tick || drawn || run.file().is_some(), Checkbox::new(&mut tick, ""));
+    let check = ui.add_enabled(tick || run.can_be_drawn(), Checkbox::new(&mut tick, ""));
     let check = check.accessible_name(format!("show run {number}"));
-    if check.on_hover_text(help).on_disabled_hover_text(help).changed() {
+    let check = check.on_hover_text(help).on_disabled_hover_text(help);
+    if check.changed() {
         if !tick {
             ticked.remove(&number);
         } else if drawn {
@@ -223,6 +229,7 @@ fn tick_ui(context: &ViewContext<'_>, run: &Run, ticked: &mut BTreeSet<u64>, ui:
     } else if tick && run.file().is_some() {
         ui.spinner();
     }
+    check
 }
 
 /// What a row was; a right click offers its command.
@@ -274,8 +281,8 @@ fn as_text(ledger: &Ledger) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::run::Sources;
     use super::*;
+    use crate::runs::Sources;
 
     #[test]
     fn rows_as_text_keep_their_columns_whatever_is_noted() {

@@ -83,6 +83,33 @@ fn experiments_are_rows_that_are_compared_shifted_noted_and_deleted_with_undo() 
 }
 
 #[test]
+fn the_last_two_runs_of_one_kind_are_drawn_by_a_command_and_any_row_by_the_keyboard() {
+    let mut window = open(options(Tab::Experiments), SIZE);
+    command(&mut window, "overlay the last two runs");
+    let said = state(&window)["message"].as_str().unwrap().to_owned();
+    assert!(said.contains("no two runs of one kind"), "{said}");
+    experiment(&mut window, "1");
+    experiment(&mut window, "2");
+    command(&mut window, "overlay the last two runs");
+    assert_eq!(state(&window)["tab"], "runs");
+    assert_eq!(state(&window)["runs_tab"]["shown"], serde_json::json!([3, 4]));
+    command(&mut window, "untick all runs");
+    assert_eq!(state(&window)["runs_tab"]["shown"], serde_json::json!([]));
+
+    // The newest row is the first; the arrows go from box to box.
+    command(&mut window, "go to the runs");
+    window.key_press(Key::Space);
+    window.run_steps(2);
+    window.key_press(Key::ArrowDown);
+    window.run_steps(2);
+    window.key_press(Key::ArrowDown);
+    window.run_steps(2);
+    window.key_press(Key::Space);
+    window.run_steps(2);
+    assert_eq!(state(&window)["runs_tab"]["shown"], serde_json::json!([2, 4]));
+}
+
+#[test]
 fn what_is_saved_of_a_run_names_its_row_and_can_be_read_back() {
     let mut window = open(options(Tab::Experiments), SIZE);
     experiment(&mut window, "7");
