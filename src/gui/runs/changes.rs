@@ -4,7 +4,8 @@ use std::collections::BTreeSet;
 
 use egui::{ComboBox, Grid, Label, RichText, ScrollArea, Ui};
 
-use super::run::{Ledger, Run, Value, differences};
+use super::ledger::Ledger;
+use super::run::{Run, Value, differences};
 use crate::widgets::{change, hint_ui, mono, section_ui, shown};
 
 /// Greatest width of a name and of a text among the values; a tip has all of it.

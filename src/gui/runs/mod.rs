@@ -4,8 +4,10 @@
 mod changes;
 mod command;
 mod curves;
+mod ledger;
 mod overlay;
 mod run;
+mod sources;
 mod table;
 mod watch;
 
@@ -23,8 +25,10 @@ use crate::widgets::empty_page_ui;
 use changes::Changes;
 pub(crate) use command::RunsCommand;
 use curves::Reading;
+pub(crate) use ledger::Ledger;
 use overlay::Overlay;
-pub(crate) use run::{Channel, Ledger, Run, RunKind, Series, Sources, Value};
+pub(crate) use run::{Channel, Run, RunKind, Series, Value};
+pub(crate) use sources::Sources;
 use table::RunTable;
 use watch::RecordingWatch;
 

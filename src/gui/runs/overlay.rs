@@ -6,7 +6,8 @@ use std::sync::Arc;
 use egui::{Button, Color32, ComboBox, Grid, Sense, Stroke, Ui, vec2};
 use flqr_core::record::{Signal, best_alignment, first_crossing_s};
 
-use super::run::{Ledger, Run, RunKind, Series};
+use super::ledger::Ledger;
+use super::run::{Run, RunKind, Series};
 use crate::command::Commands;
 use crate::job::{Job, Outcome, Waker};
 use crate::plot::{Data, Panel, PanelCurve, Stack, Unit, UnitChoice};

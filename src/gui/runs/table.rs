@@ -4,7 +4,8 @@ use std::collections::BTreeSet;
 
 use egui::{Button, Checkbox, Grid, Label, Response, RichText, ScrollArea, Sense, TextEdit, Ui};
 
-use super::run::{Ledger, Run, RunKind};
+use super::ledger::Ledger;
+use super::run::{Run, RunKind};
 use super::{RunsCommand, overlay};
 use crate::command::Command;
 use crate::context::ViewContext;

@@ -3,7 +3,8 @@
 use flqr_core::device::RecordingStatus;
 use flqr_core::model_file::Model;
 
-use super::run::{Run, RunKind, Sources, Value};
+use super::Sources;
+use super::run::{Run, RunKind, Value};
 
 /// The recording that was under way when it was looked at last.
 #[derive(Default)]
