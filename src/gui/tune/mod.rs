@@ -126,7 +126,7 @@ impl TuneTab {
             });
             return;
         }
-        let weights = Pane::left(Part::Weights, "Weights and gains", 412.0, 400.0..=480.0)
+        let weights = Pane::left(Part::Weights, "Weights and gains", 426.0, 420.0..=490.0)
             .fixed()
             .in_front(self.weights.focus_first);
         let show = |part: Part, ui: &mut Ui| match part {
