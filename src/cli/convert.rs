@@ -7,10 +7,11 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use flqr_core::record::ColumnMap;
 use flqr_core::record::mcap::{self, Conversion, ConvertError, Input};
-use flqr_core::record::{ColumnMap, Mapping};
 use serde::Serialize;
 
+use super::logs::Columns;
 use super::output::{Failure, Output};
 use super::progress::Progress;
 use super::{file, input};
@@ -21,9 +22,8 @@ pub(crate) struct Arguments {
     /// robot log takes along the frames beside it
     #[arg(required = true, num_args = 2.., value_names = ["IN", "OUT.mcap"])]
     files: Vec<PathBuf>,
-    /// A column of ours from one of the file's, as in torque_nm=current_a*0.32; repeatable
-    #[arg(long, value_name = "OURS=THEIRS[*FACTOR]")]
-    map: Vec<Mapping>,
+    #[command(flatten)]
+    columns: Columns,
 }
 
 /// Keys of the JSON object.
@@ -38,7 +38,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let (out, files) = arguments.files.split_last().expect("clap asks for two files at least");
     check_output(out)?;
     let files = with_frames(files);
-    let map = ColumnMap::new(arguments.map.clone()).map_err(Failure::from_error)?;
+    let map = arguments.columns.checked()?;
     let names: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
     let mut bytes = 0;
     let mut inputs = Vec::new();

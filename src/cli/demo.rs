@@ -2,45 +2,32 @@
 
 use std::io::{self, Write};
 use std::ops::ControlFlow;
-use std::path::PathBuf;
 
 use clap::Args;
 use flqr_core::refine::{Demonstration, demonstrate};
 
-use super::output::{Failure, Output, complain, number};
+use super::output::{Failure, Output, number};
 use super::progress::Progress;
-use super::{file, refine};
+use super::refine;
 
 #[derive(Args)]
 pub(crate) struct Arguments {
     /// Chooses what the simulated robot has that its model lacks, and draws all noise
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Write the refined model (TOML)
-    #[arg(long, value_name = "NEW.toml")]
-    out: Option<PathBuf>,
-    /// Write the report with its figures as one HTML file
-    #[arg(long, value_name = "OUT.html")]
-    report: Option<PathBuf>,
+    #[command(flatten)]
+    kept: refine::Kept,
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let bar = Progress::new("demo");
     let shown = demonstrate(arguments.seed, &mut |share| {
-        bar.set((1000.0 * share) as u64, 1000);
+        bar.set_share(share);
         ControlFlow::Continue(())
     })
     .map_err(Failure::from_error)?;
     drop(bar);
-    let found = &shown.found;
-    if let Some(path) = &arguments.out {
-        file::write(path, "model", |out| out.write_all(found.model.to_toml().as_bytes()))?;
-        complain(&format!("the refined model is in {}", path.display()));
-    }
-    if let Some(path) = &arguments.report {
-        file::write(path, "report", |out| out.write_all(found.document.to_html().as_bytes()))?;
-        complain(&format!("the report with its figures is in {}", path.display()));
-    }
+    arguments.kept.write(&shown.found)?;
     output.result(&shown, |out| print(out, &shown))
 }
 

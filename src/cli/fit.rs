@@ -7,10 +7,11 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use flqr_core::identify::{self, Bounds, Estimate, FitOptions, FitReport, FrictionPair, Method};
-use flqr_core::record::{ColumnMap, HealthFinding, Mapping};
+use flqr_core::record::HealthFinding;
 use serde::Serialize;
 
-use super::input::{self, MotorName};
+use super::input;
+use super::logs::{Estimated, print_health};
 use super::output::{Failure, Output, number};
 use super::progress::Progress;
 
@@ -23,24 +24,14 @@ pub(crate) struct Arguments {
     /// Model file (TOML) with what is known; without it the columns choose the rig
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// Motor of a robot model that the log belongs to
-    #[arg(long, value_enum, default_value = "left")]
-    motor: MotorName,
     /// Swarm and polish to the optimum, or the swarm alone
     #[arg(long, value_enum, default_value = "best")]
     method: MethodName,
     /// Bounds of the swarm: from the data, or the paper's Table 3 as printed
     #[arg(long, value_enum, default_value = "data")]
     bounds: BoundsName,
-    /// Parameters to estimate: `all`, or names as in the model file
-    #[arg(long, value_delimiter = ',', value_name = "NAME,...")]
-    estimate: Vec<String>,
-    /// A column of ours from one of the file's, as in torque_nm=current_a*0.32; repeatable
-    #[arg(long, value_name = "OURS=THEIRS[*FACTOR]")]
-    map: Vec<Mapping>,
-    /// Seed of the swarm
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
+    #[command(flatten)]
+    estimated: Estimated,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -76,10 +67,8 @@ struct Quantity {
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let model = arguments.model.as_deref().map(input::load_model).transpose()?;
-    let map = ColumnMap::new(arguments.map.clone()).map_err(Failure::from_error)?;
-    let logs =
-        arguments.logs.iter().map(|path| input::read_log(path, &map)).collect::<Result<Vec<_>, _>>()?;
-    let motor = arguments.motor.into();
+    let estimated = &arguments.estimated;
+    let logs = estimated.columns.read(&arguments.logs)?;
     let options = FitOptions {
         method: match arguments.method {
             MethodName::Best => Method::Best,
@@ -89,11 +78,11 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
             BoundsName::Data => Bounds::Data,
             BoundsName::Paper => Bounds::Paper,
         },
-        estimate: arguments.estimate.clone(),
-        seed: arguments.seed,
+        estimate: estimated.estimate.clone(),
+        seed: estimated.seed,
     };
     let bar = Progress::new("fit");
-    let report = identify::fit(&logs, model.as_ref(), motor, &options, &mut |progress| {
+    let report = identify::fit(&logs, model.as_ref(), estimated.motor.into(), &options, &mut |progress| {
         bar.set(progress.iteration as u64, progress.iterations as u64);
         ControlFlow::Continue(())
     })
@@ -131,8 +120,6 @@ fn print(out: &mut dyn Write, report: &FitReport) -> io::Result<()> {
     if !report.pairs.is_empty() {
         writeln!(out, "{} pairs, {} iterations", report.pairs.len(), report.iterations)?;
     }
-    for finding in &report.data_health {
-        writeln!(out, "{finding}")?;
-    }
+    print_health(out, &report.data_health)?;
     report.warnings.iter().try_for_each(|warning| writeln!(out, "warning: {warning}"))
 }

@@ -2,33 +2,11 @@
 
 use std::fs::File;
 use std::io::{self, BufReader, Read};
-use std::ops::ControlFlow;
 use std::path::Path;
 
-use clap::ValueEnum;
 use flqr_core::model_file::{Model, RobotModel};
-use flqr_core::record::{self, ColumnMap, Log, ReadOptions};
-
-use flqr_core::robot::Motor;
 
 use super::output::Failure;
-use super::progress::Progress;
-
-/// A motor by its name on the command line.
-#[derive(Clone, Copy, ValueEnum)]
-pub(crate) enum MotorName {
-    Left,
-    Right,
-}
-
-impl From<MotorName> for Motor {
-    fn from(name: MotorName) -> Self {
-        match name {
-            MotorName::Left => Self::Left,
-            MotorName::Right => Self::Right,
-        }
-    }
-}
 
 /// Largest text file that is read whole, bytes: a Riccati equation with 500 states is smaller.
 const LARGEST_TEXT: u64 = 64 << 20;
@@ -61,19 +39,6 @@ pub(crate) fn open(path: &Path) -> Result<(BufReader<File>, u64), Failure> {
 /// Loads a model file.
 pub(crate) fn load_model(path: &Path) -> Result<Model, Failure> {
     Model::from_toml(&read_text(path)?, &path.display().to_string()).map_err(Failure::from_error)
-}
-
-/// Reads a log with a progress bar.
-pub(crate) fn read_log(path: &Path, map: &ColumnMap) -> Result<Log, Failure> {
-    let (reader, bytes) = open(path)?;
-    let source = path.display().to_string();
-    let bar = Progress::new(format!("reading {source}"));
-    let options = ReadOptions::new(map);
-    record::read_log(reader, &source, &options, &mut |progress| {
-        bar.set(progress.bytes, bytes);
-        ControlFlow::Continue(())
-    })
-    .map_err(Failure::from_error)
 }
 
 /// Loads a model file that must describe a robot.

@@ -13,6 +13,7 @@ mod imu;
 mod input;
 mod interfaces;
 mod interrupt;
+mod logs;
 mod monitor;
 mod output;
 mod printer;

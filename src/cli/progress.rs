@@ -21,6 +21,11 @@ impl Progress {
         Self { started: Instant::now(), bar, label: label.into() }
     }
 
+    /// Moves to a share of all.
+    pub(crate) fn set_share(&self, share: f64) {
+        self.set((1000.0 * share) as u64, 1000);
+    }
+
     /// Moves to `done` of `total` units.
     pub(crate) fn set(&self, done: u64, total: u64) {
         if self.bar.is_hidden() && self.started.elapsed() > QUIET {

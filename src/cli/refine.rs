@@ -7,9 +7,10 @@ use std::path::PathBuf;
 use clap::Args;
 use flqr_core::refine::{self, ClosedLoop, Corrected, Fate, LoopRun, Options, Refinement, Verdict};
 
+use super::logs::print_health;
 use super::output::{Failure, Output, complain, number};
 use super::progress::Progress;
-use super::residual::{Common, print_errors, print_health};
+use super::residual::{Asked, print_errors};
 use super::{file, input};
 
 #[derive(Args)]
@@ -23,7 +24,14 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "LOG")]
     heldout: Vec<PathBuf>,
     #[command(flatten)]
-    common: Common,
+    asked: Asked,
+    #[command(flatten)]
+    kept: Kept,
+}
+
+/// Where a refinement is kept.
+#[derive(Args)]
+pub(crate) struct Kept {
     /// Write the refined model (TOML)
     #[arg(long, value_name = "NEW.toml")]
     out: Option<PathBuf>,
@@ -32,32 +40,40 @@ pub(crate) struct Arguments {
     report: Option<PathBuf>,
 }
 
+impl Kept {
+    pub(crate) fn write(&self, found: &Refinement) -> Result<(), Failure> {
+        if let (Some(path), Verdict::DataUnfit) = (&self.out, found.verdict) {
+            complain(&format!(
+                "{} is not written: the logs cannot answer, so that nothing is refined",
+                path.display()
+            ));
+        } else if let Some(path) = &self.out {
+            file::write(path, "model", |out| out.write_all(found.model.to_toml().as_bytes()))?;
+            complain(&format!("the refined model is in {}", path.display()));
+        }
+        if let Some(path) = &self.report {
+            file::write(path, "report", |out| out.write_all(found.document.to_html().as_bytes()))?;
+            complain(&format!("the report with its figures is in {}", path.display()));
+        }
+        Ok(())
+    }
+}
+
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let model = input::load_model(&arguments.model)?;
-    let logs = arguments.common.read(&arguments.logs)?;
-    let held_out = arguments.common.read(&arguments.heldout)?;
+    let columns = &arguments.asked.estimated.columns;
+    let logs = columns.read(&arguments.logs)?;
+    let held_out = columns.read(&arguments.heldout)?;
     let bar = Progress::new("refine");
-    let file = arguments.out.as_ref().map_or_else(String::new, |path| path.display().to_string());
-    let options = Options { model_file: file, ..arguments.common.options() };
+    let file = arguments.kept.out.as_ref().map_or_else(String::new, |path| path.display().to_string());
+    let options = Options { model_file: file, ..arguments.asked.options() };
     let found = refine::refine(&model, &logs, &held_out, &options, &mut |share| {
-        bar.set((1000.0 * share) as u64, 1000);
+        bar.set_share(share);
         ControlFlow::Continue(())
     })
     .map_err(Failure::from_error)?;
     drop(bar);
-    if let (Some(path), Verdict::DataUnfit) = (&arguments.out, found.verdict) {
-        complain(&format!(
-            "{} is not written: the logs cannot answer, so that nothing is refined",
-            path.display()
-        ));
-    } else if let Some(path) = &arguments.out {
-        file::write(path, "model", |out| out.write_all(found.model.to_toml().as_bytes()))?;
-        complain(&format!("the refined model is in {}", path.display()));
-    }
-    if let Some(path) = &arguments.report {
-        file::write(path, "report", |out| out.write_all(found.document.to_html().as_bytes()))?;
-        complain(&format!("the report with its figures is in {}", path.display()));
-    }
+    arguments.kept.write(&found)?;
     output.result(&found, |out| print(out, &found))
 }
 
@@ -74,10 +90,7 @@ pub(crate) fn print(out: &mut dyn Write, found: &Refinement) -> io::Result<()> {
     writeln!(out, "{verdict}")?;
     for effect in &found.effects {
         write!(out, "\n{}, error lower by {:.1} %", effect.effect.id(), effect.error_drop_percent)?;
-        match effect.error_drop_ci95 {
-            Some([low, high]) => writeln!(out, " ({low:.1} to {high:.1})")?,
-            None => writeln!(out)?,
-        }
+        print_ends(out, effect.error_drop_ci95)?;
         for (n, (key, value)) in effect.effect.parameters().iter().enumerate() {
             write!(out, "  {key:24}{:>14}", number(*value))?;
             match effect.ci95[n] {
@@ -94,10 +107,7 @@ pub(crate) fn print(out: &mut dyn Write, found: &Refinement) -> io::Result<()> {
     for carried in &found.carried {
         let drop = carried.error_drop_percent;
         write!(out, "\n{}, declared: error lower by {drop:.1} % with it", carried.id)?;
-        match carried.error_drop_ci95 {
-            Some([low, high]) => writeln!(out, " ({low:.1} to {high:.1})")?,
-            None => writeln!(out)?,
-        }
+        print_ends(out, carried.error_drop_ci95)?;
     }
     let lost = found.candidates.iter().filter(|tried| tried.fate != Fate::Added);
     for (n, tried) in lost.take(MOST_LOST).enumerate() {
@@ -125,6 +135,14 @@ pub(crate) fn print(out: &mut dyn Write, found: &Refinement) -> io::Result<()> {
         }
     }
     print_health(out, &found.data_health)
+}
+
+/// The rest of a line with percents: their interval, where there is one.
+fn print_ends(out: &mut dyn Write, ci95: Option<[f64; 2]>) -> io::Result<()> {
+    match ci95 {
+        Some([low, high]) => writeln!(out, " ({low:.1} to {high:.1})"),
+        None => writeln!(out),
+    }
 }
 
 /// Declared numbers that the refined model has otherwise, or that the log does not tell.

@@ -42,7 +42,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     };
     let bar = Progress::new("the paper's experiments");
     let found = reproduce::reproduce(&model, &settings, &mut |share| {
-        bar.set((1000.0 * share) as u64, 1000);
+        bar.set_share(share);
         ControlFlow::Continue(())
     });
     drop(bar);

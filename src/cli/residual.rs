@@ -5,10 +5,10 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use clap::Args;
-use flqr_core::record::{ColumnMap, HealthFinding, Log, Mapping};
 use flqr_core::refine::{self, Errors, Options, Residual};
 
-use super::input::{self, MotorName};
+use super::input;
+use super::logs::{Estimated, print_health};
 use super::output::{Failure, Output, number};
 use super::progress::Progress;
 
@@ -20,27 +20,17 @@ pub(crate) struct Arguments {
     #[arg(required = true)]
     logs: Vec<PathBuf>,
     #[command(flatten)]
-    common: Common,
+    asked: Asked,
 }
 
-/// What `residual` and `refine` share.
+/// What `residual` and `refine` are asked of logs.
 #[derive(Args)]
-pub(crate) struct Common {
-    /// Motor of a robot model that a bench log belongs to
-    #[arg(long, value_enum, default_value = "left")]
-    motor: MotorName,
-    /// Parameters that are free, not only within their tolerances: `all`, or names as in the model file
-    #[arg(long, value_delimiter = ',', value_name = "NAME,...")]
-    estimate: Vec<String>,
-    /// A column of ours from one of the file's, as in torque_nm=current_a*0.32; repeatable
-    #[arg(long, value_name = "OURS=THEIRS[*FACTOR]")]
-    map: Vec<Mapping>,
+pub(crate) struct Asked {
+    #[command(flatten)]
+    pub(crate) estimated: Estimated,
     /// Speeds of an axis or motor that count, either way, rad/s or m/s; the filters see all of the log
     #[arg(long, value_name = "LOW..HIGH", value_parser = range)]
     speeds: Option<[f64; 2]>,
-    /// Seed of everything that is drawn
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
 }
 
 /// Two numbers as LOW..HIGH.
@@ -52,29 +42,24 @@ fn range(text: &str) -> Result<[f64; 2], String> {
     }
 }
 
-impl Common {
+impl Asked {
     pub(crate) fn options(&self) -> Options {
         Options {
-            motor: self.motor.into(),
-            estimate: self.estimate.clone(),
-            seed: self.seed,
+            motor: self.estimated.motor.into(),
+            estimate: self.estimated.estimate.clone(),
+            seed: self.estimated.seed,
             speeds: self.speeds,
             ..Options::default()
         }
-    }
-
-    pub(crate) fn read(&self, paths: &[PathBuf]) -> Result<Vec<Log>, Failure> {
-        let map = ColumnMap::new(self.map.clone()).map_err(Failure::from_error)?;
-        paths.iter().map(|path| input::read_log(path, &map)).collect()
     }
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let model = input::load_model(&arguments.model)?;
-    let logs = arguments.common.read(&arguments.logs)?;
+    let logs = arguments.asked.estimated.columns.read(&arguments.logs)?;
     let bar = Progress::new("residual");
-    let found = refine::residual(&model, &logs, &arguments.common.options(), &mut |share| {
-        bar.set((1000.0 * share) as u64, 1000);
+    let found = refine::residual(&model, &logs, &arguments.asked.options(), &mut |share| {
+        bar.set_share(share);
         ControlFlow::Continue(())
     })
     .map_err(Failure::from_error)?;
@@ -139,8 +124,4 @@ fn print_predictions(out: &mut dyn Write, errors: &[(&str, &Errors)]) -> io::Res
         writeln!(out, " {} (noise {noise}, motion {motion}{why})", prediction.rmse.unit)?;
     }
     Ok(())
-}
-
-pub(crate) fn print_health(out: &mut dyn Write, findings: &[HealthFinding]) -> io::Result<()> {
-    findings.iter().try_for_each(|finding| writeln!(out, "{finding}"))
 }

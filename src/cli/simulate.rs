@@ -18,7 +18,7 @@ use flqr_core::simulate::{
 use nalgebra::{Matrix2x4, RowVector4};
 use serde::Serialize;
 
-use super::input::MotorName;
+use super::logs::MotorName;
 use super::output::{Failure, Output, complain};
 use super::progress::Progress;
 use super::{Cli, file, input};
@@ -261,7 +261,7 @@ fn experiment(arguments: &Arguments) -> Experiment {
 fn simulated(experiment: &Experiment, declared: &Model, actual: &Model) -> Result<Outcome, ExperimentError> {
     let bar = Progress::new("simulating");
     simulate::run(experiment, declared, actual, &mut |share| {
-        bar.set((1000.0 * share) as u64, 1000);
+        bar.set_share(share);
         ControlFlow::Continue(())
     })
 }

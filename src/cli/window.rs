@@ -5,10 +5,10 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use flqr_core::device::{SerialAddress, Source};
 use flqr_core::model_file::presets;
-use flqr_core::record::Mapping;
 use flqr_gui::{Tab, WindowOptions};
 
 use super::input;
+use super::logs::Columns;
 use super::output::Failure;
 
 #[derive(Args, Default, PartialEq)]
@@ -19,9 +19,8 @@ pub(crate) struct Arguments {
     /// Log to open in the window
     #[arg(long, value_name = "FILE")]
     log: Option<PathBuf>,
-    /// A column of ours from one of the log's, as in torque_nm=current_a*0.32; repeatable
-    #[arg(long, value_name = "OURS=THEIRS[*FACTOR]")]
-    map: Vec<Mapping>,
+    #[command(flatten)]
+    columns: Columns,
     /// Tab to begin with
     #[arg(long, value_enum)]
     tab: Option<TabName>,
@@ -71,7 +70,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
     let options = WindowOptions {
         model_path: arguments.model,
         log: arguments.log,
-        column_map: arguments.map,
+        column_map: arguments.columns.map,
         tab,
         source: arguments.source,
         imu: arguments.imu,
