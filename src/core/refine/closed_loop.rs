@@ -11,6 +11,7 @@ use std::ops::ControlFlow;
 use serde::Serialize;
 
 use super::error::RefineError;
+use super::{Watch, report};
 use crate::effects::{Effect, EffectKind, Feedforward, MachineKind, Role};
 use crate::model_file::{Model, Rig, RobotModel};
 use crate::parallel;
@@ -114,7 +115,7 @@ pub(super) fn closed_loop(
     refined: &mut Model,
     kinds: &[&'static EffectKind],
     seed: u64,
-    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+    watch: Watch<'_>,
 ) -> Result<Option<ClosedLoop>, RefineError> {
     if kinds.is_empty() {
         return Ok(None);
@@ -258,16 +259,14 @@ fn offered(
     kinds: &[&'static EffectKind],
     added: &[usize],
     seed: Option<u64>,
-    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+    watch: Watch<'_>,
 ) -> Result<Vec<Fed>, RefineError> {
     let effects = effects_of(refined);
     let able: Vec<usize> = added.iter().copied().filter(|&place| effects[place].is_fed_forward()).collect();
     // One after the other, each beside those that have passed, so that none hides behind another.
     let (mut verdicts, mut passed) = (Vec::new(), Vec::new());
     for (number, &place) in able.iter().enumerate() {
-        if watch(number as f64 / able.len() as f64).is_break() {
-            return Err(RefineError::Cancelled);
-        }
+        report(watch, number as f64 / able.len() as f64)?;
         let verdict = match seed {
             Some(seed) => trial(refined, &able, &passed, place, seed),
             None => Err(UNTRIED.to_owned()),

@@ -73,7 +73,10 @@ pub struct Options {
 /// Share of the work that the search is; the rest is the closed loop, predictions and the next experiment.
 const SEARCH: f64 = 0.75;
 
-fn report(watch: &mut dyn FnMut(f64) -> ControlFlow<()>, share: f64) -> Result<(), RefineError> {
+/// Told the share of the work that is done; may end it.
+type Watch<'a> = &'a mut dyn FnMut(f64) -> ControlFlow<()>;
+
+fn report(watch: Watch<'_>, share: f64) -> Result<(), RefineError> {
     if watch(share).is_break() { Err(RefineError::Cancelled) } else { Ok(()) }
 }
 

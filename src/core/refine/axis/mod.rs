@@ -14,8 +14,6 @@ mod trace;
 mod tried;
 mod waves;
 
-use std::ops::ControlFlow;
-
 use crate::effects::{self, Effect, MachineKind, Place, Role};
 use crate::identify::quantile::student_t_975;
 use crate::model_file::{Model, Rig};
@@ -27,7 +25,7 @@ use super::gain::Gain;
 use super::select::Blocks;
 use super::verdict::{Corrected, Errors, Found, Refinement, Residual, Unexplained, Verdict};
 use super::whiten::Whitener;
-use super::{Explorer, Options};
+use super::{Explorer, Options, Watch, report};
 use candidates::{Scales, library};
 use errors::errors;
 use floor::Floor;
@@ -68,7 +66,7 @@ pub(super) fn residual(
     model: &Model,
     logs: &[Log],
     options: &Options,
-    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+    watch: Watch<'_>,
 ) -> Result<Residual, RefineError> {
     let mut declared = Declared::new(model, options.motor);
     let mut data_health = health::check(logs, &declared);
@@ -116,17 +114,13 @@ fn take_out_timing(nuisances: &[Nuisance], whitener: &Whitener, target: &mut [f6
     }
 }
 
-fn report(watch: &mut dyn FnMut(f64) -> ControlFlow<()>, share: f64) -> Result<(), RefineError> {
-    if watch(share).is_break() { Err(RefineError::Cancelled) } else { Ok(()) }
-}
-
 /// Finds what the model lacks.
 pub(super) fn refine(
     model: &Model,
     logs: &[Log],
     held_out: &[Log],
     options: &Options,
-    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+    watch: Watch<'_>,
 ) -> Result<Refinement, RefineError> {
     let mut declared = Declared::new(model, options.motor);
     let mut data_health = health::check(logs.iter().chain(held_out), &declared);

@@ -28,7 +28,6 @@ mod uncertainty;
 mod waves;
 
 use std::num::NonZeroUsize;
-use std::ops::ControlFlow;
 
 use crate::effects::{Form, Moment};
 use crate::identify::quantile::student_t_975;
@@ -39,7 +38,7 @@ use super::error::RefineError;
 use super::verdict::{
     Channels as PerChannel, Corrected, Errors, Found, Quantity, Refinement, Residual, Verdict,
 };
-use super::{Explorer, Options, Variable};
+use super::{Explorer, Options, Variable, Watch, report};
 use candidates::library;
 use channels::Channels;
 use motion::Readings;
@@ -57,13 +56,6 @@ const LITTLE: f64 = 0.1;
 
 /// Threads that share the work; no answer depends on them.
 const THREADS: NonZeroUsize = NonZeroUsize::new(4).expect("four");
-
-/// Told the share of the work that is done; may end it.
-type Watch<'a> = &'a mut dyn FnMut(f64) -> ControlFlow<()>;
-
-fn report(watch: Watch<'_>, share: f64) -> Result<(), RefineError> {
-    if watch(share).is_break() { Err(RefineError::Cancelled) } else { Ok(()) }
-}
 
 /// How far a model is from logs of its robot.
 pub(super) fn residual(

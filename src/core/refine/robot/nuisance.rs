@@ -1,6 +1,7 @@
 //! Declared numbers, free within their tolerances.
 
 use crate::effects::{Action, Form, KINDS, Moment};
+use crate::friction::StribeckParameters;
 use crate::model_file::Tolerances;
 use crate::refine::select::Member;
 
@@ -66,6 +67,9 @@ const FRICTION: [&str; 4] = ["coulomb_nm", "static_nm", "viscous_nm_s_rad", "off
 const REST_SHARE: f64 = 0.3;
 const REST_SPEED_RAD_S: f64 = 0.1;
 
+/// A number of a friction curve.
+type OfCurve = fn(&StribeckParameters) -> f64;
+
 /// All declared numbers of a robot; those that are free (or all of them) without a tolerance.
 pub(super) fn nuisances(trace: &Trace, known: Known<'_>) -> Vec<Nuisance> {
     let p = trace.machine.parameters;
@@ -86,35 +90,17 @@ pub(super) fn nuisances(trace: &Trace, known: Known<'_>) -> Vec<Nuisance> {
         let kind = KINDS.iter().find(|kind| kind.id == id).expect("the library has the parameters' errors");
         trace.columns(kind, Form::Law, &[]).swap_remove(0)
     };
-    add(
-        "body_mass_kg",
-        p.body_mass_kg,
-        known.share_of("body_mass_kg") * p.body_mass_kg,
-        of_kind("mass_error"),
-    );
-    add(
-        "com_height_m",
-        p.com_height_m,
-        known.share_of("com_height_m") * p.com_height_m,
-        of_kind("com_height_error"),
-    );
-    add(
-        "body_inertia_kg_m2",
-        p.body_inertia_kg_m2,
-        known.share_of("body_inertia_kg_m2") * p.body_inertia_kg_m2,
-        of_kind("body_inertia_error"),
-    );
-    add(
-        "wheel_inertia_kg_m2",
-        p.wheel_inertia_kg_m2,
-        known.share_of("wheel_inertia_kg_m2") * p.wheel_inertia_kg_m2,
-        of_kind("inertia_error"),
-    );
+    for (key, declared, effect) in [
+        ("body_mass_kg", p.body_mass_kg, "mass_error"),
+        ("com_height_m", p.com_height_m, "com_height_error"),
+        ("body_inertia_kg_m2", p.body_inertia_kg_m2, "body_inertia_error"),
+        ("wheel_inertia_kg_m2", p.wheel_inertia_kg_m2, "inertia_error"),
+    ] {
+        add(key, declared, known.share_of(key) * declared, of_kind(effect));
+    }
     let wheels = trace.pair(|| |m: &Moment| Action::force(-2.0 * m.x_accel_m_s2, 0.0, 0.0));
     add("wheel_mass_kg", p.wheel_mass_kg, known.share_of("wheel_mass_kg") * p.wheel_mass_kg, wheels);
-    let both = |of: fn(&crate::friction::StribeckParameters) -> f64| {
-        friction.iter().flatten().map(|f| of(f) * of(f)).sum::<f64>().sqrt()
-    };
+    let both = |of: OfCurve| friction.iter().flatten().map(|f| of(f) * of(f)).sum::<f64>().sqrt();
     let curve = friction.iter().flatten().next().copied();
     let fading = move |m: &Moment| {
         curve.map_or(0.0, |f| {
@@ -122,33 +108,19 @@ pub(super) fn nuisances(trace: &Trace, known: Known<'_>) -> Vec<Nuisance> {
         })
     };
     // Of both motors together, which turn alike: the left one's key stands for both.
-    let declared = |of: fn(&crate::friction::StribeckParameters) -> f64| curve.map_or(0.0, |f| of(&f));
-    let share =
-        |key: &str, of: fn(&crate::friction::StribeckParameters) -> f64| known.share_of(key) * both(of);
-    add(
-        "coulomb_nm",
-        declared(|f| f.coulomb_nm),
-        share("coulomb_nm", |f| f.coulomb_nm),
-        trace.pair(|| move |m: &Moment| Action::friction(1.0 - fading(m))),
-    );
-    add(
-        "static_nm",
-        declared(|f| f.static_nm),
-        share("static_nm", |f| f.static_nm),
-        trace.pair(|| move |m: &Moment| Action::friction(fading(m))),
-    );
-    add(
-        "viscous_nm_s_rad",
-        declared(|f| f.viscous_nm_s_rad),
-        share("viscous_nm_s_rad", |f| f.viscous_nm_s_rad),
-        trace.pair(|| |m: &Moment| Action::motor(-m.motor_speed_rad_s)),
-    );
-    add(
-        "offset_nm",
-        declared(|f| f.offset_nm),
-        share("offset_nm", |f| f.offset_nm),
-        trace.pair(|| |_: &Moment| Action::motor(-1.0)),
-    );
+    let of_curve: [(&'static str, OfCurve, Pair); 4] = [
+        ("coulomb_nm", |f| f.coulomb_nm, trace.pair(|| move |m: &Moment| Action::friction(1.0 - fading(m)))),
+        ("static_nm", |f| f.static_nm, trace.pair(|| move |m: &Moment| Action::friction(fading(m)))),
+        (
+            "viscous_nm_s_rad",
+            |f| f.viscous_nm_s_rad,
+            trace.pair(|| |m: &Moment| Action::motor(-m.motor_speed_rad_s)),
+        ),
+        ("offset_nm", |f| f.offset_nm, trace.pair(|| |_: &Moment| Action::motor(-1.0))),
+    ];
+    for (key, of, pair) in of_curve {
+        add(key, curve.map_or(0.0, |f| of(&f)), known.share_of(key) * both(of), pair);
+    }
     let rest = REST_SHARE * both(|f| f.static_nm);
     add(
         "",

@@ -1,12 +1,11 @@
 //! Forward selection of effects: singles, pairs, and checks backward and on held-out rows.
 
-use std::ops::ControlFlow;
-
 use crate::effects::EffectKind;
 use crate::identify::quantile::student_t_975;
 use crate::refine::error::RefineError;
 use crate::refine::gain::Gain;
 use crate::refine::select::{Blocks, Judged, Member};
+use crate::refine::{Watch, report};
 
 use super::super::candidates::Candidate;
 use super::super::rig::Nuisance;
@@ -95,14 +94,9 @@ struct Round<'b> {
 
 impl Search<'_> {
     /// Looks for effects until none passes.
-    pub(in super::super) fn run(
-        &mut self,
-        watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
-    ) -> Result<(), RefineError> {
+    pub(in super::super) fn run(&mut self, watch: Watch<'_>) -> Result<(), RefineError> {
         while self.picks.len() < MOST && self.step() == Some(true) {
-            if watch(0.2 + 0.6 * self.picks.len() as f64 / MOST as f64).is_break() {
-                return Err(RefineError::Cancelled);
-            }
+            report(watch, 0.2 + 0.6 * self.picks.len() as f64 / MOST as f64)?;
         }
         self.check_backwards();
         Ok(())
