@@ -44,4 +44,10 @@ pub mod reproduce;
 pub mod robot;
 pub mod simulate;
 
+#[cfg(test)]
+extern crate self as flqr_core;
+#[cfg(test)]
+#[path = "tests/shared/mod.rs"]
+mod shared;
+
 pub use parameter::ParameterError;

@@ -3,10 +3,11 @@
 
 use std::ops::ControlFlow;
 
-use super::test_data::{Noise, RIGHT, even_pairs, measured};
+use super::test_data::{Noise, RIGHT, even_pairs};
 use super::*;
 use crate::friction::Stribeck;
 use crate::record::Log;
+use crate::shared::shared_log;
 
 const INERTIA: f64 = 0.005;
 /// 1 deg/s.
@@ -239,7 +240,7 @@ fn logs_of_one_speed_each_are_merged_and_other_mixtures_are_refused() {
 #[test]
 fn a_measured_constant_speed_is_recognised() {
     let map = ["torque_nm=current_a", "motor_angle_rad=angle_rad", "motor_speed_rad_s=speed_rad_s"];
-    let Some(log) = measured("laas_bldc/speed_test1.csv", &map) else { return };
+    let Some(log) = shared_log("laas_bldc/speed_test1.csv", &map) else { return };
     let set = pairs_from_log(&log, Motor::Left).unwrap();
     let speeds: Vec<f64> = set.dwells.iter().map(|dwell| dwell.speed_rad_s).collect();
     assert!(set.is_constant_speed(), "{} {speeds:?} {:?}", set.constant_share, set.warnings);
@@ -255,7 +256,7 @@ fn measured_motions_are_fitted_as_motions() {
         ("undeclared/example-bench/log.csv", &[], "inertia_kg_m2"),
         ("emps/emps_standard.csv", &[], "mass_kg"),
     ] {
-        let Some(log) = measured(name, map) else { return };
+        let Some(log) = shared_log(name, map) else { return };
         let report =
             fit(&[log], None, Motor::Left, &FitOptions::default(), &mut |_| ControlFlow::Continue(()));
         let report = report.unwrap();

@@ -1,8 +1,4 @@
-//! Made-up and measured data for the tests.
-
-use std::fs::File;
-use std::io::BufReader;
-use std::ops::ControlFlow;
+//! Made-up data for the tests.
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
@@ -10,7 +6,6 @@ use rand_chacha::rand_core::SeedableRng;
 use super::FrictionPair;
 use super::swarm::uniform;
 use crate::friction::{Stribeck, StribeckParameters};
-use crate::record::{ColumnMap, Log, ReadOptions, read_log};
 
 /// Left motor of Table 4.
 pub(super) const LEFT: StribeckParameters = StribeckParameters {
@@ -77,18 +72,4 @@ pub(super) fn even_pairs(
 ) -> Vec<FrictionPair> {
     let speeds = (0..count).map(|i| -50.0 + 100.0 * f64::from(i) / f64::from(count - 1));
     pairs_at(parameters, speeds, noise_nm, seed)
-}
-
-/// A measured log, or nothing where the data are absent and not required.
-#[expect(clippy::disallowed_methods, reason = "measured data are read where they are at hand")]
-pub(super) fn measured(name: &str, map: &[&str]) -> Option<Log> {
-    let path = format!("{}/../../../shared/data/{name}", env!("CARGO_MANIFEST_DIR"));
-    let Ok(file) = File::open(&path) else {
-        assert!(std::env::var_os("FLQR_REQUIRE_SHARED").is_none(), "{path} is absent");
-        println!("skipped: {path} is absent");
-        return None;
-    };
-    let map = ColumnMap::new(map.iter().map(|entry| entry.parse().unwrap()).collect()).unwrap();
-    let mut quiet = |_| ControlFlow::Continue(());
-    Some(read_log(BufReader::new(file), name, &ReadOptions::new(&map), &mut quiet).unwrap())
 }

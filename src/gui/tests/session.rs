@@ -218,13 +218,12 @@ fn runs_are_replaced_by_those_of_a_file_after_a_question_and_come_back_by_undo()
     assert_eq!(titles(&window), ["other"]);
 }
 
-/// A pipe holds the reading up until something is written to it.
 #[cfg(unix)]
 #[test]
 fn what_was_changed_while_the_last_session_was_read_stays() {
     let folder = Folder::new("late");
     let pipe = folder.0.join("last.flqr-session");
-    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    common::make_pipe(&pipe);
     let mut window = open(folder.options(), SIZE);
     command(&mut window, "Robot to the bottom");
     let row = json!({
@@ -242,13 +241,12 @@ fn what_was_changed_while_the_last_session_was_read_stays() {
     assert_eq!(window.ctx.zoom_factor(), 1.25, "which nobody had changed");
 }
 
-/// A pipe holds the reading up until something is written to it.
 #[cfg(unix)]
 #[test]
 fn a_question_waits_for_the_one_that_is_open() {
     let folder = Folder::new("queue");
     let pipe = folder.0.join("pipe.toml");
-    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    common::make_pipe(&pipe);
     let mut window = open(folder.options(), SIZE);
     enter(&mut window, "pitch weight", "5");
     enter(&mut window, "model path", pipe.to_str().unwrap());

@@ -591,13 +591,12 @@ fn a_file_that_was_not_loaded_is_kept_unless_the_user_says_overwrite() {
     until(&mut window, "saving without a question", |s| s["unsaved_changes"] == false);
 }
 
-/// A pipe holds the reading up until something is written to it.
 #[cfg(unix)]
 #[test]
 fn a_second_model_file_waits_for_the_end_of_the_first() {
     let pipe = TempFile::new("pipe.toml", "");
     std::fs::remove_file(&pipe.0).unwrap();
-    assert!(std::process::Command::new("mkfifo").arg(&pipe.0).status().unwrap().success());
+    common::make_pipe(&pipe.0);
     let other = TempFile::new("beside.toml", "as before");
     let model_path = Some(other.0.clone());
     let mut window = open(WindowOptions { model_path, ..options(Tab::Tune) }, SIZE);

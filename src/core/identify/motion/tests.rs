@@ -1,5 +1,6 @@
 use super::*;
-use crate::identify::test_data::{Noise, measured};
+use crate::identify::test_data::Noise;
+use crate::shared::shared_log;
 
 fn fit(logs: &[Log], axis: Axis, known: Option<&KnownAxis>, estimate: &[&str]) -> MotionFit {
     let names: Vec<String> = estimate.iter().map(|name| (*name).to_owned()).collect();
@@ -10,7 +11,7 @@ fn fit(logs: &[Log], axis: Axis, known: Option<&KnownAxis>, estimate: &[&str]) -
 /// "Data Set and Reference Models of EMPS", 2019), relative error 4.03 to 4.07 % by the same procedure.
 #[test]
 fn published_values_of_the_positioning_system_are_found() {
-    let Some(log) = measured("emps/emps_standard.csv", &[]) else { return };
+    let Some(log) = shared_log("emps/emps_standard.csv", &[]) else { return };
     let found = fit(&[log], Axis::Linear, None, &["all"]);
     for (key, published, tolerance) in [
         ("mass_kg", 95.1089, 0.0005 * 95.1),
@@ -30,7 +31,7 @@ fn published_values_of_the_positioning_system_are_found() {
 /// The sliding friction that the simulated bench declares (Eq. 28), with its sticking stretches left out.
 #[test]
 fn a_bench_with_stribeck_friction_gives_back_its_declared_curve() {
-    let Some(log) = measured("undeclared/example-bench/log.csv", &[]) else { return };
+    let Some(log) = shared_log("undeclared/example-bench/log.csv", &[]) else { return };
     let known = KnownAxis { inertia: 0.004, friction: Some(PAPER_LEFT), gravity_torque_nm: 0.0 };
     let found = fit(&[log], Axis::Rotary, Some(&known), &[]);
     for (key, declared) in [
@@ -54,7 +55,7 @@ fn measured_pendulums_give_weight_and_inertia_in_proportion() {
     let mut found = Vec::new();
     for mass in [1.0, 3.0] {
         let name = format!("go1_pendulum/go1_m{mass}kg_sin_sin.csv");
-        let Some(log) = measured(&name, &map) else { return };
+        let Some(log) = shared_log(&name, &map) else { return };
         let gravity_torque_nm = (mass + 0.039) * 9.81 * 0.15;
         let known = KnownAxis { inertia: 0.01, friction: None, gravity_torque_nm };
         let free = fit(&[log], Axis::Rotary, Some(&known), &["all", "gravity_torque_nm"]);
@@ -71,7 +72,7 @@ fn measured_pendulums_give_weight_and_inertia_in_proportion() {
 #[test]
 fn both_halves_of_a_jittered_log_give_the_same_motor() {
     let map = ["motor_angle_rad=angle_rad", "torque_nm=current_a"];
-    let Some(log) = measured("laas_bldc/acc_current.csv", &map) else { return };
+    let Some(log) = shared_log("laas_bldc/acc_current.csv", &map) else { return };
     let half = |from: usize, to: usize| {
         let columns = log.columns.iter();
         Log::from_columns("half", columns.map(|c| (c.name.clone(), c.values[from..to].to_vec())))
@@ -88,7 +89,7 @@ fn both_halves_of_a_jittered_log_give_the_same_motor() {
 #[test]
 fn a_steady_spin_with_a_jittered_clock_leaves_the_inertia_out() {
     let map = ["motor_angle_rad=angle_rad", "torque_nm=current_a"];
-    let Some(log) = measured("laas_bldc/rolling_data1.csv", &map) else { return };
+    let Some(log) = shared_log("laas_bldc/rolling_data1.csv", &map) else { return };
     let found = fit(&[log], Axis::Rotary, None, &[]);
     assert_eq!(found.parameter("inertia_kg_m2"), None, "{found:#?}");
     assert!(found.warnings.iter().any(|warning| warning.contains("small and noisy")), "{found:#?}");

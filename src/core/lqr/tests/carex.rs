@@ -1,26 +1,19 @@
 //! The CAREX collection (Abels, Benner) against references of 22 or 40 digits and against the best of scipy,
 //! slycot and drake on the same doubles.
 
-use std::fs;
-
 use nalgebra::DMatrix;
 use serde_json::Value;
 
 use super::{decimal, relative_error};
 use crate::lqr::{CareInput, solve_care};
+use crate::shared::shared_text;
 
 /// The peers' best is taken as no better than half a unit in the last place.
 const ROUNDING: f64 = 1.1e-16;
 
 #[test]
-#[expect(clippy::disallowed_methods, reason = "reads the shared collection where there is one")]
 fn no_example_is_ten_times_worse_than_the_best_peer_and_the_mean_is_below_5e_15() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/carex/carex.json");
-    let Ok(text) = fs::read_to_string(path) else {
-        assert!(std::env::var_os("FLQR_REQUIRE_SHARED").is_none(), "{path} is missing");
-        println!("skipped: {path} is absent");
-        return;
-    };
+    let Some(text) = shared_text("carex/carex.json") else { return };
     let collection: Value = serde_json::from_str(&text).unwrap();
     let examples = collection["examples"].as_array().unwrap();
     let mut logarithms = 0.0;

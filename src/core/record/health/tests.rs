@@ -1,6 +1,7 @@
 use std::f64::consts::PI;
 
 use super::*;
+use crate::shared::shared_log;
 
 /// A bench log without faults: a swept shaft with an encoder of 16 bits and noise in the torque.
 fn bench() -> Log {
@@ -364,22 +365,6 @@ fn missing_values_are_told_with_their_line() {
 /// The findings of a shared log.
 fn shared(name: &str, map: &[&str]) -> Option<Vec<HealthFinding>> {
     shared_log(name, map).map(|log| data_health(&log))
-}
-
-/// A shared log, or nothing where the data are absent and not required.
-#[expect(clippy::disallowed_methods, reason = "measured data are read where they are at hand")]
-fn shared_log(name: &str, map: &[&str]) -> Option<Log> {
-    use crate::record::{ColumnMap, ReadOptions, read_log};
-    let path = format!("{}/../../../shared/data/{name}", env!("CARGO_MANIFEST_DIR"));
-    let Ok(file) = std::fs::File::open(&path) else {
-        assert!(std::env::var_os("FLQR_REQUIRE_SHARED").is_none(), "{path} is absent");
-        println!("skipped: {path} is absent");
-        return None;
-    };
-    let map = ColumnMap::new(map.iter().map(|entry| entry.parse().unwrap()).collect()).unwrap();
-    let reader = std::io::BufReader::new(file);
-    let mut quiet = |_| std::ops::ControlFlow::Continue(());
-    Some(read_log(reader, name, &ReadOptions::new(&map), &mut quiet).unwrap())
 }
 
 #[test]

@@ -7,10 +7,11 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::model_file::Model;
-use crate::record::{ColumnMap, HealthFinding, Log, ReadOptions, Severity, read_log};
+use crate::record::{HealthFinding, Log, Severity};
 use crate::refine::verdict::Channels;
 use crate::refine::{Options, Refinement, Verdict, refine, residual};
 use crate::robot::Motor;
+use crate::shared::shared_log;
 use crate::simulate::{self, ControllerChoice, Experiment, Scenario};
 
 fn refined(model: &str, logs: &[Log], held_out: &[Log], estimate: &[&str]) -> Refinement {
@@ -289,27 +290,13 @@ fn the_same_log_gives_the_same_bytes() {
     assert_eq!(told(), told());
 }
 
-/// A shared log, or nothing where the data are absent and not required.
-#[expect(clippy::disallowed_methods, reason = "measured data are read where they are at hand")]
-fn shared(name: &str, map: &[&str]) -> Option<Log> {
-    let path = format!("{}/../../../shared/data/{name}", env!("CARGO_MANIFEST_DIR"));
-    let Ok(file) = std::fs::File::open(&path) else {
-        assert!(std::env::var_os("FLQR_REQUIRE_SHARED").is_none(), "{path} is absent");
-        println!("skipped: {path} is absent");
-        return None;
-    };
-    let map = ColumnMap::new(map.iter().map(|entry| entry.parse().unwrap()).collect()).unwrap();
-    let reader = std::io::BufReader::new(file);
-    Some(read_log(reader, name, &ReadOptions::new(&map), &mut |_| ControlFlow::Continue(())).unwrap())
-}
-
 const BENCH: &str = "name = \"R0\"\n[axis]\nkind = \"rotary\"\ninertia_kg_m2 = 0.005\n[friction]\n\
                      coulomb_nm = 0.0338\nstatic_nm = 0.0761\nviscous_nm_s_rad = 0.00049\n\
                      stribeck_speed_rad_s = 1.612\nstribeck_exponent = 0.231\noffset_nm = -0.0016\n";
 
 #[test]
 fn undeclared_cogging_of_a_bench_log_is_found() {
-    let logs = ["log", "heldout"].map(|part| shared(&format!("undeclared/example-bench/{part}.csv"), &[]));
+    let logs = ["log", "heldout"].map(|part| shared_log(&format!("undeclared/example-bench/{part}.csv"), &[]));
     let [Some(log), Some(held_out)] = logs else { return };
     let found = refined(BENCH, &[log], &[held_out], &[]);
     assert_eq!(ids(&found), ["cogging"]);
@@ -327,7 +314,7 @@ const FREE: [&str; 4] = ["inertia_kg_m2", "viscous_nm_s_rad", "coulomb_nm", "off
 /// Whatever the model file says of the inertia, which nobody measured.
 #[test]
 fn cogging_of_a_measured_motor_is_found_at_its_order() {
-    let Some(log) = shared("laas_bldc/speed_test1.csv", &LAAS) else { return };
+    let Some(log) = shared_log("laas_bldc/speed_test1.csv", &LAAS) else { return };
     for inertia in ["0.0002", "4e-6", "0.01"] {
         let found = refined(&SMALL.replacen("0.0002", inertia, 1), std::slice::from_ref(&log), &[], &FREE);
         assert_eq!(ids(&found)[0], "cogging");
@@ -359,7 +346,7 @@ fn error_of(model: &Model, log: &Log) -> f64 {
 /// between them.
 #[test]
 fn a_refined_motor_carries_over_to_another_record() {
-    let Some(log) = shared("laas_bldc/speed_test1.csv", &LAAS) else { return };
+    let Some(log) = shared_log("laas_bldc/speed_test1.csv", &LAAS) else { return };
     let (first, second) = (between(&log, 0.0..15.0), between(&log, 15.0..31.0));
     let found = refined(SMALL, &[first], &[], &FREE);
     assert_eq!(found.effects[0].effect.get("order_1"), Some(72.0), "{:?}", ids(&found));
@@ -374,7 +361,7 @@ fn a_refined_motor_carries_over_to_another_record() {
 #[test]
 fn an_effect_of_a_measured_motor_carries_over_to_a_record_at_other_speeds() {
     let logs = ["speed_test1", "acc_current", "rolling_data1"];
-    let logs = logs.map(|name| shared(&format!("laas_bldc/{name}.csv"), &LAAS));
+    let logs = logs.map(|name| shared_log(&format!("laas_bldc/{name}.csv"), &LAAS));
     let [Some(slow), Some(fast), Some(rolling)] = logs else { return };
     let model = refined(SMALL, &[slow], &[], &FREE).model;
     let text = model.to_toml();
@@ -398,7 +385,7 @@ fn an_effect_of_a_measured_motor_carries_over_to_a_record_at_other_speeds() {
 
 #[test]
 fn a_fast_measured_motor_gets_no_effect() {
-    let Some(log) = shared("laas_bldc/acc_current.csv", &LAAS) else { return };
+    let Some(log) = shared_log("laas_bldc/acc_current.csv", &LAAS) else { return };
     let found = refined(SMALL, &[log], &[], &FREE);
     assert!(found.effects.is_empty(), "{:?}", ids(&found));
     let lag = |finding: &crate::record::HealthFinding| finding.problem.contains("ms later than");
@@ -407,7 +394,7 @@ fn a_fast_measured_motor_gets_no_effect() {
 
 #[test]
 fn the_published_positioning_axis_lacks_effects() {
-    let Some(log) = shared("emps/emps_standard.csv", &[]) else { return };
+    let Some(log) = shared_log("emps/emps_standard.csv", &[]) else { return };
     let model = "name = \"EMPS\"\n[axis]\nkind = \"linear\"\nmass_kg = 95.1089\n[friction]\ncoulomb_n = 20.3935\n\
                  viscous_n_s_m = 203.5034\noffset_n = -3.1648\n";
     let found = refined(model, &[log], &[], &["all"]);
@@ -428,7 +415,7 @@ fn a_gear_is_told_of_an_arm_without_a_weight_too() {
     let map = ["motor_angle_rad=angle_rad", "motor_speed_rad_s=speed_rad_s"];
     let model = "name = \"pendulum\"\n[axis]\nkind = \"rotary\"\ninertia_kg_m2 = 0.01158\ngravity_torque_nm = 0.05739\n\
                  [friction]\ncoulomb_nm = 0.09\nviscous_nm_s_rad = 0.047\n";
-    let Some(log) = shared("go1_pendulum/go1_m0kg_sin_sin.csv", &map) else { return };
+    let Some(log) = shared_log("go1_pendulum/go1_m0kg_sin_sin.csv", &map) else { return };
     for estimate in [&[][..], &["all"]] {
         let found = refined(model, std::slice::from_ref(&log), &[], estimate);
         assert_eq!((found.verdict, ids(&found)), (Verdict::DataUnfit, vec![]));
@@ -449,15 +436,15 @@ fn a_geared_torque_is_told_before_any_effect() {
     let model = "name = \"pendulum\"\n[axis]\nkind = \"rotary\"\ninertia_kg_m2 = 0.034\ngravity_torque_nm = 1.529\n\
                  [friction]\ncoulomb_nm = 0.0914\nviscous_nm_s_rad = 0.047\n";
     let path = |name: &str| format!("go1_pendulum/go1_m1kg_{name}.csv");
-    let Some(raw) = shared(&path("sin_sin"), &map) else { return };
+    let Some(raw) = shared_log(&path("sin_sin"), &map) else { return };
     let found = refined(model, &[raw], &[], &[]);
     assert_eq!(found.verdict, Verdict::DataUnfit);
     assert!(found.data_health[0].problem.contains("a gear lies between"), "{:#?}", found.data_health);
     let logs: Vec<Log> = ["sin_sin", "lift_and_drop", "sin_time_square"]
         .iter()
-        .filter_map(|name| shared(&path(name), &mended))
+        .filter_map(|name| shared_log(&path(name), &mended))
         .collect();
-    let held_out: Vec<Log> = shared(&path("up_and_down"), &mended).into_iter().collect();
+    let held_out: Vec<Log> = shared_log(&path("up_and_down"), &mended).into_iter().collect();
     let found = refined(model, &logs, &held_out, &["all"]);
     assert_ne!(found.verdict, Verdict::DataUnfit, "{:#?}", found.data_health);
     assert!(found.after.nrmse.main() < 0.1, "{}", found.after.nrmse.main());
@@ -475,7 +462,7 @@ fn a_measured_pendulum_tells_each_path_from_the_others() {
              gravity_torque_nm = {gravity}\n[friction]\ncoulomb_nm = 0.0914\nviscous_nm_s_rad = 0.047\n"
         );
         for out in paths {
-            let read = |path: &str| shared(&format!("go1_pendulum/go1_m{mass:.0}kg_{path}.csv"), &map);
+            let read = |path: &str| shared_log(&format!("go1_pendulum/go1_m{mass:.0}kg_{path}.csv"), &map);
             let Some(held_out) = read(out) else { return };
             let logs: Vec<Log> =
                 paths.iter().filter(|path| **path != out).filter_map(|path| read(path)).collect();

@@ -3,19 +3,22 @@
 //! The cases here are a sample for every build; `cargo bench -p flqr-core --bench undeclared` prints the whole table.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
-#![expect(clippy::disallowed_methods, reason = "these tests read the given logs")]
 
 mod bench;
 mod generator;
+#[cfg(test)]
+#[path = "../shared/mod.rs"]
+mod shared;
 
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
 
 use flqr_core::model_file::Model;
-use flqr_core::record::{ColumnMap, Log, ReadOptions, Severity, read_log};
+use flqr_core::record::{Log, Severity};
 use flqr_core::refine::{Fate, Options, Refinement, Verdict, refine};
 use generator::fault::Fault;
 use generator::{Case, Conditions, cases};
+use shared::{shared_log, shared_text};
 
 const SHORT: Conditions = Conditions { seconds: 24.0, excitation: 1.0, noise: 1.0 };
 
@@ -271,21 +274,11 @@ fn a_robot_at_rest_is_unfit() {
 /// The given example logs, where they are there.
 #[test]
 fn given_examples_are_right() {
-    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/undeclared");
-    if !std::path::Path::new(folder).exists() {
-        assert!(std::env::var_os("FLQR_REQUIRE_SHARED").is_none(), "{folder} is absent");
-        println!("skipped: {folder} is absent");
-        return;
-    }
-    let read = |path: String| {
-        let file = std::io::BufReader::new(std::fs::File::open(&path).unwrap());
-        let map = ColumnMap::default();
-        read_log(file, &path, &ReadOptions::new(&map), &mut |_| ControlFlow::Continue(())).unwrap()
-    };
     for (name, effect) in [("example-balance", Some("tether_spring")), ("example-clean", None)] {
-        let text = std::fs::read_to_string(format!("{folder}/{name}/model.toml")).unwrap();
+        let Some(text) = shared_text(&format!("undeclared/{name}/model.toml")) else { return };
         let model = Model::from_toml(&text, name).unwrap();
-        let logs = ["log", "heldout"].map(|log| read(format!("{folder}/{name}/{log}.csv")));
+        let logs =
+            ["log", "heldout"].map(|log| shared_log(&format!("undeclared/{name}/{log}.csv"), &[]).unwrap());
         for (first, second) in [(0, 1), (1, 0)] {
             let (log, held) = ([logs[first].clone()], [logs[second].clone()]);
             let found =

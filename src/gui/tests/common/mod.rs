@@ -2,7 +2,7 @@
 
 #![allow(dead_code, reason = "each test program uses a part of it")]
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use egui::{Event, Key, Modifiers, PointerButton, Pos2, Vec2, vec2};
@@ -98,6 +98,11 @@ pub(crate) fn command(window: &mut Window, name: &str) {
     window.run_steps(2);
     window.key_press(Key::Enter);
     window.run_steps(4);
+}
+
+/// A pipe at this path: it holds a reading up until something is written to it.
+pub(crate) fn make_pipe(path: &Path) {
+    assert!(std::process::Command::new("mkfifo").arg(path).status().unwrap().success());
 }
 
 /// A file that is removed with the test.
