@@ -25,6 +25,7 @@ mod read;
 pub mod recording;
 mod replay;
 mod rows;
+pub(crate) mod runs;
 mod sample;
 pub mod schema;
 mod table;

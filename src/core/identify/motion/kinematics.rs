@@ -248,3 +248,23 @@ pub fn white_noise<'a>(windows: impl Iterator<Item = &'a [f64]>) -> f64 {
     }
     sum / (70.0 * count.max(1) as f64)
 }
+
+/// sign(v), 0 at rest.
+pub(crate) fn direction(speed: f64) -> f64 {
+    if speed == 0.0 { 0.0 } else { speed.signum() }
+}
+
+/// Samples within `reach` of a rest: a stretch of more than `blur` samples below the rest speed. A passage through 0 is
+/// none.
+pub(crate) fn near_rest(speed: &[f64], rest_speed: f64, blur: usize, reach: usize) -> Vec<bool> {
+    let mut near = vec![false; speed.len()];
+    let mut start = 0;
+    for run in speed.chunk_by(|a, b| (a.abs() < rest_speed) == (b.abs() < rest_speed)) {
+        let end = start + run.len();
+        if run.len() > blur && run[0].abs() < rest_speed {
+            near[start.saturating_sub(reach)..(end + reach).min(speed.len())].fill(true);
+        }
+        start = end;
+    }
+    near
+}

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use nalgebra::DVector;
 
-use super::kinematics::{Sieve, Stretch, stretches};
+use super::kinematics::{Sieve, Stretch, direction, near_rest, stretches};
 use super::regression::{Normal, half_widths, residual};
 use super::stribeck_search::{Shape, Span, search};
 use super::{Axis, KnownAxis, MotionError, MotionFit, MotionParameter, MotionSeries, place};
@@ -113,7 +113,7 @@ impl Problem {
         self.span.widen(rest_speed, rms);
         for (stretch, motion) in stretches.into_iter().zip(motions) {
             let step_s = stretch.step_s;
-            let resting = near_rest(&motion.speed, rest_speed, sieve.blur());
+            let resting = near_rest(&motion.speed, rest_speed, sieve.blur(), sieve.blur());
             let kept: Vec<bool> =
                 sieve.row_samples(resting.len(), step_s).map(|sample| !resting[sample]).collect();
             let times = sieve.row_samples(resting.len(), step_s).map(|sample| sample as f64 * step_s);
@@ -498,25 +498,6 @@ fn report(watch: &mut dyn FnMut(f64) -> ControlFlow<()>, share: f64) -> Result<(
     if watch(share).is_break() { Err(MotionError::Cancelled) } else { Ok(()) }
 }
 
-/// sign(v), 0 at rest.
-fn direction(speed: f64) -> f64 {
-    if speed == 0.0 { 0.0 } else { speed.signum() }
-}
-
 fn chosen<'a>(values: &'a [f64], kept: &'a [bool]) -> impl Iterator<Item = f64> + 'a {
     values.iter().zip(kept).filter(|(_, kept)| **kept).map(|(value, _)| *value)
-}
-
-/// Samples within `blur` of a rest: a stretch of more than `blur` samples below the rest speed.
-fn near_rest(speed: &[f64], rest_speed: f64, blur: usize) -> Vec<bool> {
-    let mut near = vec![false; speed.len()];
-    let mut start = 0;
-    for run in speed.chunk_by(|a, b| (a.abs() < rest_speed) == (b.abs() < rest_speed)) {
-        let end = start + run.len();
-        if run.len() > blur && run[0].abs() < rest_speed {
-            near[start.saturating_sub(blur)..(end + blur).min(speed.len())].fill(true);
-        }
-        start = end;
-    }
-    near
 }

@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use super::{Findings, finite, range, rows};
 use crate::record::Log;
+use crate::record::runs::usual_run;
 
 /// Reports on one column of the schema.
 pub(super) fn check(log: &Log, name: &str, values: &[f64], row_s: Option<f64>, findings: &mut Findings) {
@@ -23,7 +24,7 @@ pub(super) fn check(log: &Log, name: &str, values: &[f64], row_s: Option<f64>, f
         }
         return;
     }
-    let held = held_rows(values);
+    let held = usual_run(values);
     if let (2.., Some(row_s)) = (held, row_s) {
         let hz = 1.0 / (held as f64 * row_s);
         findings
@@ -53,17 +54,6 @@ fn missing(log: &Log, name: &str, values: &[f64], findings: &mut Findings) {
         let have = if absent == 1 { "has" } else { "have" };
         findings.info(name, format!("{absent} of {} {have} no value{place}", rows(values.len())));
     }
-}
-
-/// Rows for which a value usually stays before it changes: the median over the runs of equal values.
-fn held_rows(values: &[f64]) -> usize {
-    let mut runs: Vec<usize> = values.chunk_by(|a, b| a == b).map(<[f64]>::len).collect();
-    // A rest or a saturated stretch is one long run; the runs of a slow sensor are many.
-    if runs.len() < 10 {
-        return 1;
-    }
-    let middle = runs.len() / 2;
-    *runs.select_nth_unstable(middle).1
 }
 
 /// Values that are multiples of a step that is coarse against the range.

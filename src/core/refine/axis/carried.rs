@@ -4,13 +4,14 @@
 use std::f64::consts::TAU;
 
 use crate::effects::{Effect, Machine, MachineKind, Role};
+use crate::identify::motion::kinematics::direction;
 use crate::record::{HealthFinding, Log, Severity};
 use crate::refine::gain::Gain;
 use crate::refine::select::{Blocks, Member};
 use crate::refine::verdict::Carried;
 use crate::refine::whiten::Whitener;
 
-use super::rig::{Declared, Nuisance, direction, torque_between};
+use super::rig::{Declared, Nuisance, torque_between};
 use super::search::{Search, White};
 use super::trace::{Acting, Part, Rows, Trace};
 

@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use crate::record::runs::longest_run;
+
 /// Share of a log for which a column stays the same from which on it may be dead.
 const DEAD: f64 = 0.2;
 /// Of the width of the effort elsewhere, what it then has while the position stands.
@@ -15,7 +17,7 @@ const DIFFERENCES: usize = 50;
 
 /// Rows in which a position stands still though the effort does there what it does elsewhere.
 pub(super) fn position(position: &[f64], effort: &[f64]) -> Option<Range<usize>> {
-    let rows = longest_run(position).filter(|_| effort.len() == position.len())?;
+    let rows = unchanged(position).filter(|_| effort.len() == position.len())?;
     let inside = width(effort[rows.clone()].iter());
     let outside = width(effort[..rows.start].iter().chain(&effort[rows.end..]));
     (inside > AS_BEFORE * outside).then_some(rows)
@@ -23,7 +25,7 @@ pub(super) fn position(position: &[f64], effort: &[f64]) -> Option<Range<usize>>
 
 /// Rows in which the effort on a shaft that no load turns stays the same though its speed goes up and down as elsewhere.
 pub(super) fn effort(position: &[f64], effort: &[f64]) -> Option<Range<usize>> {
-    let rows = longest_run(effort).filter(|_| effort.len() == position.len())?;
+    let rows = unchanged(effort).filter(|_| effort.len() == position.len())?;
     let step = (rows.len() / DIFFERENCES).max(1);
     let speeds = |part: &[f64]| -> Vec<f64> {
         let ends: Vec<f64> = part.iter().step_by(step).copied().collect();
@@ -39,13 +41,8 @@ pub(super) fn effort(position: &[f64], effort: &[f64]) -> Option<Range<usize>> {
 }
 
 /// The longest run of equal values that is a fair part of a column, and not all of it.
-fn longest_run(values: &[f64]) -> Option<Range<usize>> {
-    let mut start = 0;
-    let runs = values.chunk_by(|a, b| a == b).map(|run| {
-        start += run.len();
-        start - run.len()..start
-    });
-    let longest = runs.max_by_key(ExactSizeIterator::len)?;
+fn unchanged(values: &[f64]) -> Option<Range<usize>> {
+    let longest = longest_run(values)?;
     (longest.len() as f64 >= DEAD * values.len() as f64 && longest.len() < values.len()).then_some(longest)
 }
 

@@ -3,12 +3,14 @@
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 
+use crate::identify::motion::kinematics::direction;
+use crate::record::runs::usual_run;
 use crate::record::{self, HealthFinding, Log, Severity};
 use crate::refine::rates;
 use crate::refine::select::{Blocks, Member};
 
 use super::dead;
-use super::rig::{Declared, Nuisance, direction};
+use super::rig::{Declared, Nuisance};
 use super::trace::{Part, Rows, Trace};
 
 /// Fewest rows in a second at which friction and harmonics of a motor's loop are seen.
@@ -146,16 +148,6 @@ pub(super) fn inseparable(declared: &Declared) -> HealthFinding {
         "the motion does not tell the model's parameters apart".to_owned(),
         "record motion at several speeds in both directions, or free fewer parameters",
     )
-}
-
-/// Rows for which a value usually stays before it changes.
-fn usual_run(values: &[f64]) -> usize {
-    let mut runs: Vec<usize> = values.chunk_by(|a, b| a == b).map(<[f64]>::len).collect();
-    if runs.len() < 10 {
-        return 1;
-    }
-    let middle = runs.len() / 2;
-    *runs.select_nth_unstable(middle).1
 }
 
 /// Share of rows in runs at the largest and smallest value.

@@ -2,6 +2,7 @@
 
 use crate::effects::{Effect, Machine, MachineKind, Role};
 use crate::friction::{Stribeck, StribeckParameters};
+use crate::identify::motion::kinematics::direction;
 use crate::identify::motion::{Axis, place};
 use crate::model_file::{AxisParameters, Model, Rig, Tolerances};
 use crate::refine::Variable;
@@ -444,10 +445,6 @@ impl Declared {
         }
         model
     }
-}
-
-pub(super) fn direction(speed: f64) -> f64 {
-    if speed == 0.0 { 0.0 } else { speed.signum() }
 }
 
 /// Mean torque over the interval that a second difference sees, if a row's torque acts until the next row.

@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use crate::effects::{EffectKind, Law, MachineKind, Moment, Place};
 use crate::identify::filter::{ZeroPhase, derivative};
-use crate::identify::motion::kinematics::{Stretch, stretches, white_noise};
+use crate::identify::motion::kinematics::{Stretch, near_rest, stretches, white_noise};
 use crate::record::Log;
 use crate::refine::select::{Blocks, Member};
 use crate::refine::split::split_s;
@@ -234,7 +234,9 @@ impl Rows {
         let rest_speed = (REST_SHARE * rms).max(3.0 * noise);
         for (stretch, speed) in stretches.into_iter().zip(motions) {
             let acceleration = derivative(&speed, stretch.step_s);
-            let resting = near_rest(&speed, rest_speed, self.kernel.blur());
+            let blur = self.kernel.blur();
+            // The kernel reaches twice as far as it resolves.
+            let resting = near_rest(&speed, rest_speed, blur, 2 * blur);
             counts[0] += resting.iter().filter(|&&rest| rest).count();
             counts[1] += resting.len();
             let second = second_difference(&stretch.position, stretch.step_s);
@@ -500,20 +502,4 @@ fn agreement(kernel: &Kernel, stretches: &[Stretch], asked: Asked) -> Option<Agr
     let found = blocks.fit(&members, 0.0)?;
     let incoherent = blocks.left(&members, &found) / blocks.target_power();
     Some(Agreement { factor: found[0], lag_s: found[1] / found[0], incoherent })
-}
-
-/// Samples within the kernel's reach of a rest: a speed near 0 for longer than the kernel resolves. A passage through
-/// 0 is none.
-fn near_rest(speed: &[f64], rest_speed: f64, blur: usize) -> Vec<bool> {
-    let reach = 2 * blur;
-    let mut near = vec![false; speed.len()];
-    let mut start = 0;
-    for run in speed.chunk_by(|a, b| (a.abs() < rest_speed) == (b.abs() < rest_speed)) {
-        let end = start + run.len();
-        if run.len() > blur && run[0].abs() < rest_speed {
-            near[start.saturating_sub(reach)..(end + reach).min(speed.len())].fill(true);
-        }
-        start = end;
-    }
-    near
 }

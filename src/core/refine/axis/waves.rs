@@ -1,10 +1,10 @@
 //! Which harmonics of the position a residual has.
 
 use crate::effects::{EffectKind, KINDS, Machine};
+use crate::identify::motion::kinematics::direction;
 use crate::refine::whiten::Whitener;
 
 use super::candidates::{Candidate, Scales, shape_of_wave, wave_numbers};
-use super::rig::direction;
 use super::trace::Rows;
 
 /// Waves of each kind that are looked at closely.

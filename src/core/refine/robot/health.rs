@@ -2,6 +2,7 @@
 
 use crate::effects::Machine;
 use crate::model_file::RobotModel;
+use crate::record::runs::longest_run;
 use crate::record::{self, HealthFinding, Log, Severity};
 use crate::refine::rates;
 
@@ -253,12 +254,7 @@ fn died(readings: &Readings) -> Option<HealthFinding> {
         high - low
     };
     let stays = |own: &[f64], other: &[f64], least: f64| {
-        let mut start = 0;
-        let runs = own.chunk_by(|a, b| a == b).map(|run| {
-            start += run.len();
-            start - run.len()..start
-        });
-        let longest = runs.max_by_key(ExactSizeIterator::len)?;
+        let longest = longest_run(own)?;
         let seconds = longest.len() as f64 * readings.dt_s;
         (seconds > DEAD_S && travel(&other[longest.clone()]) > least)
             .then_some([seconds, longest.start as f64 * readings.dt_s])
