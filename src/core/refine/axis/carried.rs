@@ -3,16 +3,14 @@
 
 use std::f64::consts::TAU;
 
-use crate::effects::{Effect, Machine, MachineKind, Role};
+use crate::effects::{Effect, MachineKind, Role};
 use crate::identify::motion::kinematics::direction;
 use crate::record::{HealthFinding, Log, Severity};
 use crate::refine::gain::Gain;
 use crate::refine::select::{Blocks, Member};
 use crate::refine::verdict::Carried;
-use crate::refine::whiten::Whitener;
 
-use super::rig::{Declared, Nuisance, torque_between};
-use super::search::{Search, White};
+use super::rig::{Declared, torque_between};
 use super::trace::{Acting, Part, Rows, Trace};
 
 /// Zeros that are tried in a period of the finest wave.
@@ -111,7 +109,7 @@ pub(super) fn carried(
     with: &[f64],
     without: impl Fn(&[f64]) -> Option<Vec<f64>>,
 ) -> Vec<Carried> {
-    let held_out: Vec<bool> = rows.rows.iter().map(|row| row.part == Part::HeldOut).collect();
+    let held_out = rows.held_out();
     let worth = |effect: &Effect| {
         let gain = Gain::new(&without(&declared.known(effect, rows))?, with, &held_out)?;
         Some(Carried {
@@ -122,20 +120,6 @@ pub(super) fn carried(
         })
     };
     declared.effects.iter().filter_map(worth).collect()
-}
-
-/// What is left with the declared numbers estimated anew from a target.
-pub(super) fn fitted(
-    rows: &Rows,
-    machine: &Machine,
-    nuisances: &[Nuisance],
-    [measured, target]: [&[f64]; 2],
-    whitener: &Whitener,
-    inertia: f64,
-) -> Option<Vec<f64>> {
-    let white = White::new(rows, whitener, nuisances, [measured, target], inertia);
-    let search = Search::new(rows, machine, nuisances, target, (whitener, &white, &[]));
-    Some(search.residual(&search.fit(&[])?.judged.coefficients))
 }
 
 /// Findings about other zeros of the angle, and about effects without which the logs are told better.

@@ -10,7 +10,8 @@ use crate::refine::rates;
 use crate::refine::select::{Blocks, Member};
 
 use super::dead;
-use super::rig::{Declared, Nuisance};
+use super::nuisance::Nuisance;
+use super::rig::Declared;
 use super::trace::{Part, Rows, Trace};
 
 /// Fewest rows in a second at which friction and harmonics of a motor's loop are seen.

@@ -6,25 +6,14 @@ use crate::identify::motion::kinematics::direction;
 use crate::identify::motion::{Axis, place};
 use crate::model_file::{AxisParameters, Model, Rig, Tolerances};
 use crate::refine::Variable;
-use crate::refine::error::RefineError;
+use crate::refine::select::{Blocks, Member};
 use crate::robot::Motor;
 
+use super::nuisance::Nuisance;
 use super::trace::{Acting, Names, Part, Rows, Trace};
-use crate::refine::select::{Blocks, Member};
 
-/// Share of the Coulomb level that an offset may be off by, beside its own tolerance.
-const OFFSET_OF_COULOMB: f64 = 0.01;
-/// A curve that fades above this share of the fastest motion is as good as constant there.
-const STRIBECK_OF_FASTEST: f64 = 0.5;
-/// How far a free inertia may be from the declared one, as a share of it.
-const FREE_INERTIA: [f64; 2] = [-0.99, 99.0];
 /// Largest share of the acceleration's power that is taken for noise.
 const MOST_NOISE: f64 = 0.5;
-/// In the place of an effect: when the torque acts.
-const TIMING: &str = "timing";
-/// A sampled torque may act anywhere between its own row and the next.
-const TIMING_ROWS: f64 = 0.5;
-
 /// The declared axis.
 #[derive(Clone, Debug)]
 pub(super) struct Declared {
@@ -40,55 +29,6 @@ pub(super) struct Declared {
     pub(super) told_from: Option<[f64; 2]>,
     /// Where the angle of each log counts from, as the effects have it, rad.
     pub(super) zeros_rad: Vec<f64>,
-}
-
-/// A declared number that is estimated along.
-pub(super) struct Nuisance {
-    /// Key as in the model file; empty for the timing of the torque, which no model holds.
-    pub(super) key: &'static str,
-    pub(super) declared: f64,
-    /// What an estimate adds to it; of the Stribeck speed and exponent the logarithm.
-    pub(super) column: Vec<f64>,
-    pub(super) tolerance: f64,
-    pub(super) free: bool,
-    /// The effect that says the same without a tolerance.
-    pub(super) effect: &'static str,
-}
-
-impl Nuisance {
-    /// Whether it is the inertia or mass.
-    pub(super) fn is_inertia(&self) -> bool {
-        self.effect == "inertia_error"
-    }
-
-    /// Whether it is the timing of the torque.
-    pub(super) fn is_timing(&self) -> bool {
-        self.effect == TIMING
-    }
-
-    pub(super) fn member(&self, column: usize) -> Member {
-        match (self.free, self.effect) {
-            (false, _) => Member::within(column, self.tolerance),
-            // An axis without inertia would take the torque for its own explanation.
-            (true, "inertia_error") => {
-                Member { bounds: FREE_INERTIA.map(|share| share * self.declared), ..Member::free(column) }
-            }
-            // Friction takes power, it never gives any.
-            (true, "viscous_error" | "coulomb_error") => {
-                Member { bounds: [-self.declared, f64::INFINITY], ..Member::free(column) }
-            }
-            (true, _) => Member::free(column),
-        }
-    }
-
-    /// The corrected number.
-    pub(super) fn corrected(&self, change: f64) -> f64 {
-        if self.is_logarithmic() { self.declared * change.exp() } else { self.declared + change }
-    }
-
-    pub(super) fn is_logarithmic(&self) -> bool {
-        self.key.starts_with("stribeck")
-    }
 }
 
 impl Declared {
@@ -132,7 +72,7 @@ impl Declared {
         self.machine.kind == MachineKind::Linear
     }
 
-    fn axis(&self) -> Axis {
+    pub(super) fn axis(&self) -> Axis {
         if self.is_linear() { Axis::Linear } else { Axis::Rotary }
     }
 
@@ -176,8 +116,13 @@ impl Declared {
         if self.is_linear() { "N" } else { "N m" }
     }
 
-    fn curve(&self) -> StribeckParameters {
+    pub(super) fn curve(&self) -> StribeckParameters {
         self.friction.unwrap_or(StribeckParameters::NONE)
+    }
+
+    /// Whether its friction at rest is another than when it slides.
+    pub(super) fn has_stribeck(&self) -> bool {
+        self.curve().static_nm != self.curve().coulomb_nm
     }
 
     /// Efforts at the rows: measured, and measured less what the declared numbers explain.
@@ -244,137 +189,6 @@ impl Declared {
         if let Some(inertia) = found.map(|found| found[0]).filter(|inertia| *inertia > 0.0) {
             self.inertia = inertia;
         }
-    }
-
-    /// Everything that is estimated along.
-    ///
-    /// # Errors
-    /// A name in `estimate` that is none.
-    pub(super) fn nuisances(&self, rows: &Rows, estimate: &[String]) -> Result<Vec<Nuisance>, RefineError> {
-        let curve = self.curve();
-        let keys = self.axis().keys();
-        if let Some(name) = estimate.iter().find(|name| *name != "all" && !keys.contains(&name.as_str())) {
-            let allowed = keys.iter().filter(|key| !key.is_empty()).copied().collect::<Vec<_>>().join(", ");
-            return Err(RefineError::UnknownParameter { name: name.clone(), allowed });
-        }
-        let all = estimate.iter().any(|name| name == "all");
-        let asked =
-            |index: usize| (all && index <= place::OFFSET) || estimate.iter().any(|name| name == keys[index]);
-        // One way, both are the same constant: the offset stays as it is declared.
-        let told_apart = rows.both_ways() || !asked(place::COULOMB);
-        let free = |index: usize| asked(index) && (index != place::OFFSET || told_apart);
-        let share = |index: usize| self.tolerances.share_of(keys[index]);
-        let mut found = Vec::new();
-        let mut add = |index: usize, declared: f64, tolerance: f64, effect, column: Vec<f64>| {
-            if free(index) || tolerance > 0.0 {
-                found.push(Nuisance {
-                    key: keys[index],
-                    declared,
-                    column,
-                    tolerance,
-                    free: free(index),
-                    effect,
-                });
-            }
-        };
-        add(
-            place::INERTIA,
-            self.inertia,
-            share(place::INERTIA) * self.inertia,
-            "inertia_error",
-            rows.column(Trace::second_difference),
-        );
-        add(
-            place::VISCOUS,
-            curve.viscous_nm_s_rad,
-            share(place::VISCOUS) * curve.viscous_nm_s_rad,
-            "viscous_error",
-            rows.column(|trace| trace.speed.clone()),
-        );
-        let stribeck = curve.static_nm != curve.coulomb_nm;
-        let fading =
-            |speed: f64, scale: f64, exponent: f64| libm::exp(-libm::pow(speed.abs() / scale, exponent));
-        let fade = |speed: f64| {
-            if stribeck { fading(speed, curve.stribeck_speed_rad_s, curve.stribeck_exponent) } else { 0.0 }
-        };
-        let each = |value: &dyn Fn(f64) -> f64| {
-            rows.column(|trace| trace.speed.iter().map(|&speed| direction(speed) * value(speed)).collect())
-        };
-        add(
-            place::COULOMB,
-            curve.coulomb_nm,
-            share(place::COULOMB) * curve.coulomb_nm,
-            "coulomb_error",
-            each(&|speed| 1.0 - fade(speed)),
-        );
-        if stribeck {
-            add(place::STATIC, curve.static_nm, share(place::STATIC) * curve.static_nm, "", each(&fade));
-            let drop = curve.static_nm - curve.coulomb_nm;
-            const STEP: f64 = 1e-3;
-            let slope = |step_scale: f64, step_exponent: f64| {
-                let at = |side: f64| {
-                    let scale = curve.stribeck_speed_rad_s * (side * step_scale).exp();
-                    let exponent = curve.stribeck_exponent * (side * step_exponent).exp();
-                    move |speed: f64| fading(speed, scale, exponent)
-                };
-                let (up, down) = (at(1.0), at(-1.0));
-                each(&|speed| drop * (up(speed) - down(speed)) / (2.0 * STEP))
-            };
-            add(
-                place::STRIBECK_SPEED,
-                curve.stribeck_speed_rad_s,
-                share(place::STRIBECK_SPEED),
-                "",
-                slope(STEP, 0.0),
-            );
-            add(
-                place::STRIBECK_EXPONENT,
-                curve.stribeck_exponent,
-                share(place::STRIBECK_EXPONENT),
-                "",
-                slope(0.0, STEP),
-            );
-        }
-        let offset = share(place::OFFSET) * curve.offset_nm.abs() + OFFSET_OF_COULOMB * curve.coulomb_nm;
-        add(
-            place::OFFSET,
-            curve.offset_nm,
-            offset,
-            "friction_asymmetry",
-            rows.column(|trace| vec![1.0; trace.position.len()]),
-        );
-        let gravity = share(place::GRAVITY) * self.gravity.abs();
-        let sines = |trace: &Trace| trace.position.iter().map(|&angle| libm::sin(angle)).collect();
-        if !self.is_linear() {
-            add(place::GRAVITY, self.gravity, gravity, "", rows.column(sines));
-        }
-        // A curve without a Stribeck part may lack a little of one, at speeds that the log has.
-        let level = share(place::STATIC) * curve.coulomb_nm;
-        let fastest = rows.counted(|trace, sample| trace.speed[sample].abs()).into_iter().fold(0.0, f64::max);
-        let scale = curve.stribeck_speed_rad_s;
-        if !stribeck && level > 0.0 && scale < STRIBECK_OF_FASTEST * fastest {
-            let faded = |trace: &Trace| {
-                let at = |&v: &f64| direction(v) * fading(v, scale, curve.stribeck_exponent);
-                trace.speed.iter().map(at).collect()
-            };
-            found.push(Nuisance {
-                key: "",
-                declared: 0.0,
-                column: rows.column(faded),
-                tolerance: level,
-                free: false,
-                effect: "",
-            });
-        }
-        found.push(Nuisance {
-            key: "",
-            declared: 0.0,
-            column: rows.column(torque_rate),
-            tolerance: TIMING_ROWS * rows.kernel.step_s,
-            free: false,
-            effect: TIMING,
-        });
-        Ok(found)
     }
 
     /// A number as the model file has it.
@@ -451,10 +265,4 @@ impl Declared {
 pub(super) fn torque_between(trace: &Trace) -> Vec<f64> {
     let before = |sample: usize| trace.effort[sample.saturating_sub(1)];
     (0..trace.effort.len()).map(|sample| 0.5 * (trace.effort[sample] + before(sample))).collect()
-}
-
-/// Change of the torque over that interval, N m/s: what a shift in time adds, without a share of the torque's noise.
-fn torque_rate(trace: &Trace) -> Vec<f64> {
-    let before = |sample: usize| trace.effort[sample.saturating_sub(1)];
-    (0..trace.effort.len()).map(|sample| (trace.effort[sample] - before(sample)) / trace.step_s).collect()
 }

@@ -282,6 +282,11 @@ impl Rows {
         rms > 5.0 * noise
     }
 
+    /// Which rows are held out.
+    pub(super) fn held_out(&self) -> Vec<bool> {
+        self.rows.iter().map(|row| row.part == Part::HeldOut).collect()
+    }
+
     /// Whether a fair share of the rows goes either way.
     pub(super) fn both_ways(&self) -> bool {
         let speeds = self.counted(|trace, sample| trace.speed[sample]);

@@ -9,7 +9,7 @@ use crate::refine::select::{Blocks, Judged, Member};
 use crate::refine::whiten::Whitener;
 
 use super::candidates::{Candidate, Scales};
-use super::rig::Nuisance;
+use super::nuisance::Nuisance;
 use super::trace::{Part, Rows};
 pub(super) use steps::{Alone, Thresholds};
 
@@ -104,7 +104,7 @@ impl White {
         let noise = rows.position_noise
             * whitener.variance(|frequency| kernel.acceleration_noise(frequency), kernel.thinning);
         // Where rows are few, motion itself looks like noise.
-        let acceleration = nuisances.iter().position(|nuisance| nuisance.effect == "inertia_error");
+        let acceleration = nuisances.iter().position(Nuisance::is_inertia);
         let power = acceleration.map_or(f64::INFINITY, |place| {
             let column = whitener.apply(&nuisances[place].column);
             column.iter().map(|a| a * a).sum::<f64>() / count as f64
@@ -207,7 +207,7 @@ impl<'a> Search<'a> {
     /// Members of nuisances and of candidates, whose first columns are given. A nuisance that an effect says without a
     /// tolerance is left out.
     fn members(&self, chosen: &[(&Candidate, usize)], searched: bool) -> Vec<Member> {
-        let said = |nuisance: &Nuisance| chosen.iter().any(|(pick, _)| pick.kind.id == nuisance.effect);
+        let said = |nuisance: &Nuisance| chosen.iter().any(|(pick, _)| nuisance.says(pick.kind));
         let nuisances = self.nuisances.iter().enumerate().map(|(column, nuisance)| {
             let member = nuisance.member(column);
             let held = self.held.iter().any(|held| held.nuisance == column);
@@ -219,7 +219,7 @@ impl<'a> Search<'a> {
         });
         let picks = chosen.iter().flat_map(|(pick, first)| {
             let mut members = pick.members(*first, self.machine.kind, searched);
-            let declared = self.nuisances.iter().find(|nuisance| nuisance.effect == pick.kind.id);
+            let declared = self.nuisances.iter().find(|nuisance| nuisance.says(pick.kind));
             if let Some(nuisance) =
                 declared.filter(|nuisance| nuisance.declared > 0.0 && !nuisance.key.is_empty())
             {

@@ -8,8 +8,7 @@ use crate::refine::select::{Blocks, Judged, Member};
 use crate::refine::{Watch, report};
 
 use super::super::candidates::Candidate;
-use super::super::rig::Nuisance;
-use super::super::trace::Part;
+use super::super::nuisance::Nuisance;
 use super::super::waves;
 use super::{Fit, Held, Search};
 
@@ -230,7 +229,7 @@ impl Search<'_> {
             }
             let Some(tried) = self.try_with(round, &[index]) else { continue };
             let others: Vec<Member> = (0..self.nuisances.len())
-                .filter(|&i| self.nuisances[i].effect != candidate.kind.id)
+                .filter(|&i| !self.nuisances[i].says(candidate.kind))
                 .map(Member::free)
                 .collect();
             let first = self.nuisances.len();
@@ -327,7 +326,7 @@ impl Search<'_> {
     /// Takes out picks without which the held-out rows are told as well, the most doubtful first: the interval of what
     /// each gains there must not hold 0; where there are too few rows for an interval, the gain itself counts.
     pub(in super::super) fn check_held_out(&mut self) -> Option<()> {
-        let held_out: Vec<bool> = self.rows.rows.iter().map(|row| row.part == Part::HeldOut).collect();
+        let held_out = self.rows.held_out();
         while !self.picks.is_empty() {
             let with = self.residual(&self.fit(&[])?.judged.coefficients);
             // Without rows that were held out nothing is sure.
@@ -360,7 +359,7 @@ impl Search<'_> {
             let fit = self.fit(&[])?;
             let t = student_t_975(fit.blocks.count().max(2) - 1);
             let untold = |(index, nuisance): (usize, &Nuisance)| {
-                let known = nuisance.effect == "inertia_error" || nuisance.key.is_empty() || !nuisance.free;
+                let known = nuisance.is_inertia() || nuisance.key.is_empty() || !nuisance.free;
                 let seen = needed.contains(&index) || self.held.iter().any(|held| held.nuisance == index);
                 if known || seen {
                     return None;
