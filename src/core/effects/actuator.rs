@@ -4,7 +4,7 @@
 
 use std::collections::VecDeque;
 
-use super::kind::{EffectKind, Feedforward, Grid, Parameter, Place, Step, Trial, undeclared};
+use super::kind::{EffectKind, Feedforward, Grid, Parameter, Place, Signal, Step, Trial, undeclared};
 use super::law::{Action, Moment, Term};
 use super::machine::MachineKind;
 
@@ -22,7 +22,7 @@ pub(super) static COMMAND_DELAY: EffectKind = EffectKind {
         .sized()
         .tried(TIMES, Step::Factor(1.3))],
     wave: None,
-    trial: Trial::PLAIN,
+    trial: Trial::PLAIN.of(Signal::MeasuredTorque),
     make_terms: |_, shape| {
         let mut line = DelayLine::new(shape[0]);
         vec![Term::fixed(move |m: &Moment| Action::motor(line.delayed(m.torque_nm, m.dt_s) - m.torque_nm))]
@@ -42,7 +42,7 @@ pub(super) static ACTUATOR_LAG: EffectKind = EffectKind {
         .sized()
         .tried(TIMES, Step::Factor(1.3))],
     wave: None,
-    trial: Trial::PLAIN,
+    trial: Trial::PLAIN.of(Signal::MeasuredTorque),
     make_terms: |_, shape| {
         let mut lag = Lag::new(shape[0]);
         vec![Term::fixed(move |m: &Moment| Action::motor(lag.mean(m.torque_nm, m.dt_s) - m.torque_nm))]
@@ -60,7 +60,7 @@ pub(super) static TORQUE_GAIN: EffectKind = EffectKind {
     machines: EVERYWHERE,
     parameters: &[Parameter::amplitude("gain", [-0.9, 10.0], "share of the torque that is added to it")],
     wave: None,
-    trial: Trial::PLAIN,
+    trial: Trial::PLAIN.of(Signal::WantedTorque),
     make_terms: |_, _| vec![Term::new("gain", |m: &Moment| Action::motor(m.torque_nm))],
     separated_by: "a known payload, or a known weight on a lever",
     feedforward: Feedforward::Causal,
@@ -77,7 +77,7 @@ pub(super) static TORQUE_SATURATION: EffectKind = EffectKind {
         .linear("limit_n", [1e-3, 1e6])
         .tried(Grid::OfTorque(&[0.5, 0.6, 0.7, 0.8, 0.9]), Step::Factor(1.08))],
     wave: None,
-    trial: Trial::PLAIN,
+    trial: Trial::PLAIN.of(Signal::MeasuredTorque),
     make_terms: |_, shape| {
         let limit = shape[0];
         let cut = move |torque: f64| torque.clamp(-limit, limit);
@@ -98,7 +98,7 @@ pub(super) static TORQUE_DEADZONE: EffectKind = EffectKind {
         .linear("width_n", [0.0, 1e4])
         .tried(Grid::Values(&[0.01, 0.02, 0.04, 0.08]), Step::Factor(1.4))],
     wave: None,
-    trial: Trial::cautious(1.6),
+    trial: Trial::cautious(1.6).of(Signal::MeasuredTorque),
     make_terms: |_, shape| {
         let width = shape[0];
         vec![Term::fixed(move |m: &Moment| Action::motor(-m.torque_nm.clamp(-width, width)))]
@@ -125,7 +125,7 @@ pub(super) static BACKLASH: EffectKind = EffectKind {
             .tried(Grid::OfWheelInertia(0.2), Step::Fixed),
     ],
     wave: None,
-    trial: Trial::cautious(1.6),
+    trial: Trial::cautious(1.6).of(Signal::MeasuredTorque),
     make_terms: |_, shape| {
         let mut gap = Gap { width: shape[0], inertia: shape[1], place: None, speed: 0.0 };
         vec![Term::fixed(move |m: &Moment| {

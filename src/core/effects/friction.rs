@@ -1,7 +1,9 @@
 //! Friction beside the declared curve.
 
 use super::effect::Effect;
-use super::kind::{Declared, EffectKind, Feedforward, Form, Grid, Parameter, Place, Step, Trial, undeclared};
+use super::kind::{
+    Declared, EffectKind, Feedforward, Form, Grid, Parameter, Place, Signal, Step, Trial, undeclared,
+};
 use super::law::{Action, Moment, Term};
 use super::machine::MachineKind;
 use crate::friction::{Stribeck, StribeckParameters};
@@ -20,7 +22,7 @@ pub(super) static QUADRATIC_DRAG: EffectKind = EffectKind {
         .linear("drag_n_s2_m2", [-1e5, 1e5])
         .opposing()],
     wave: None,
-    trial: Trial::PLAIN,
+    trial: Trial::PLAIN.of(Signal::Speed),
     make_terms: |machine, _| {
         vec![Term::new(QUADRATIC_DRAG.parameters[0].key(machine.kind), |m: &Moment| {
             Action::motor(-m.motor_speed_rad_s * m.motor_speed_rad_s.abs())
@@ -44,7 +46,7 @@ pub(super) static VISCOUS_ASYMMETRY: EffectKind = EffectKind {
     )
     .linear("viscous_n_s_m", [-1e5, 1e5])],
     wave: None,
-    trial: Trial { forms: &[Form::Law, Form::Forward(&VISCOUS_ERROR)], ..Trial::PLAIN },
+    trial: Trial { forms: &[Form::Law, Form::Forward(&VISCOUS_ERROR)], ..Trial::PLAIN.of(Signal::Speed) },
     make_terms: |machine, _| {
         vec![Term::new(VISCOUS_ASYMMETRY.parameters[0].key(machine.kind), |m: &Moment| {
             Action::motor(-m.motor_speed_rad_s.abs())
@@ -56,7 +58,7 @@ pub(super) static VISCOUS_ASYMMETRY: EffectKind = EffectKind {
 };
 
 /// Another level of dry friction forward than backward. Beside a curve with an offset it is that offset's error.
-pub(super) static FRICTION_ASYMMETRY: EffectKind = EffectKind {
+pub(crate) static FRICTION_ASYMMETRY: EffectKind = EffectKind {
     id: "friction_asymmetry",
     summary: "dry friction that is larger forward and smaller backward, as an offset of the friction is",
     place: Place::Motor,
@@ -90,7 +92,7 @@ pub(super) static LOW_SPEED_FRICTION: EffectKind = EffectKind {
         Parameter::amplitude("level_nm", [-5.0, 5.0], "level at rest").linear("level_n", [-1e4, 1e4]),
     ],
     wave: None,
-    trial: Trial::cautious(1.6),
+    trial: Trial::cautious(1.6).of(Signal::Speed),
     make_terms: |machine, shape| {
         let scale = shape[0];
         vec![Term::new(LOW_SPEED_FRICTION.parameters[1].key(machine.kind), move |m: &Moment| {
@@ -114,7 +116,7 @@ pub(super) static LOAD_DEPENDENT_FRICTION: EffectKind = EffectKind {
         "level as a share of the torque's magnitude",
     )],
     wave: None,
-    trial: Trial::PLAIN,
+    trial: Trial::PLAIN.of(Signal::MeasuredTorque),
     make_terms: |_, _| vec![Term::new("coefficient", |m: &Moment| Action::friction(m.torque_nm.abs()))],
     separated_by: "several loads at one speed",
     feedforward: Feedforward::Causal,
@@ -180,7 +182,7 @@ pub(super) static PRESLIDING: EffectKind = EffectKind {
 };
 
 /// A declared f_c, with f_s, that is wrong.
-pub(super) static COULOMB_ERROR: EffectKind = EffectKind {
+pub(crate) static COULOMB_ERROR: EffectKind = EffectKind {
     id: "coulomb_error",
     summary: "level of the declared friction curve that is off by a constant",
     place: Place::Motor,
@@ -192,7 +194,7 @@ pub(super) static COULOMB_ERROR: EffectKind = EffectKind {
     )
     .linear("coulomb_n", [-1e4, 1e4])],
     wave: None,
-    trial: Trial::PLAIN,
+    trial: Trial::PLAIN.of(Signal::Speed),
     make_terms: |machine, _| {
         vec![Term::new(COULOMB_ERROR.parameters[0].key(machine.kind), |_: &Moment| Action::friction(1.0))]
     },
@@ -208,7 +210,7 @@ pub(super) static COULOMB_ERROR: EffectKind = EffectKind {
 };
 
 /// A declared f_v that is wrong.
-pub(super) static VISCOUS_ERROR: EffectKind = EffectKind {
+pub(crate) static VISCOUS_ERROR: EffectKind = EffectKind {
     id: "viscous_error",
     summary: "viscous coefficient of the declared friction curve that is off",
     place: Place::Motor,
@@ -216,7 +218,7 @@ pub(super) static VISCOUS_ERROR: EffectKind = EffectKind {
     parameters: &[Parameter::amplitude("viscous_nm_s_rad", [-10.0, 10.0], "what is added to it")
         .linear("viscous_n_s_m", [-1e5, 1e5])],
     wave: None,
-    trial: Trial::PLAIN,
+    trial: Trial::PLAIN.of(Signal::Speed),
     make_terms: |machine, _| {
         vec![Term::new(VISCOUS_ERROR.parameters[0].key(machine.kind), |m: &Moment| {
             Action::motor(-m.motor_speed_rad_s)

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::kind::{EffectKind, Feedforward, Grid, Parameter, Place, Step, Trial, undeclared};
+use super::kind::{EffectKind, Feedforward, Grid, Parameter, Place, Signal, Step, Trial, undeclared};
 use super::law::{Action, Moment, Term};
 use super::machine::{Machine, MachineKind};
 
@@ -49,7 +49,7 @@ pub(super) static TORQUE_RIPPLE: EffectKind = EffectKind {
         Parameter::amplitude("sin_#", [-1.0, 1.0], "sine part as a share of the torque"),
     ],
     wave: Some(ripple),
-    trial: Trial::PLAIN,
+    trial: Trial::PLAIN.of(Signal::MeasuredTorque),
     make_terms: |machine, shape| {
         let keys = ["cos_#", "sin_#"];
         harmonics(machine, shape, keys, keys, ripple)

@@ -123,6 +123,21 @@ pub enum Form {
     Late,
 }
 
+/// What the column of an effect is made of, on a log of one motor or axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Signal {
+    /// The speed alone.
+    Speed,
+    /// The acceleration, and its noise.
+    Acceleration,
+    /// The torque as it was measured, which then explains itself.
+    MeasuredTorque,
+    /// The torque that the model wants: a scale of the measured one that is off.
+    WantedTorque,
+    /// Anything else: position, direction, time.
+    Other,
+}
+
 /// How a search over logs goes about an effect.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trial {
@@ -134,14 +149,22 @@ pub struct Trial {
     pub brief: bool,
     /// Ways to enter.
     pub forms: &'static [Form],
+    /// What its column is made of.
+    pub signal: Signal,
 }
 
 impl Trial {
     /// Of an effect without anything special.
-    pub(super) const PLAIN: Self = Self { caution: 1.0, repeats: false, brief: false, forms: &[Form::Law] };
+    pub(super) const PLAIN: Self =
+        Self { caution: 1.0, repeats: false, brief: false, forms: &[Form::Law], signal: Signal::Other };
     /// Of one that noise and what is next to it easily look like.
     pub(super) const fn cautious(caution: f64) -> Self {
         Self { caution, ..Self::PLAIN }
+    }
+
+    /// Of one whose column is made of this.
+    pub(super) const fn of(self, signal: Signal) -> Self {
+        Self { signal, ..self }
     }
 }
 
@@ -315,6 +338,16 @@ impl EffectKind {
     /// Whether the parameters repeat, numbered from 1, as harmonics do.
     pub fn series(&self) -> bool {
         self.wave.is_some()
+    }
+
+    /// What a wave of unit height does at a moment of a motor or axis, N m or N; 0 of one that has no waves.
+    pub fn wave_nm(&self, moment: &Moment) -> f64 {
+        self.wave.map_or(0.0, |wave| wave(1.0, moment).on_motor_nm(moment.direction()))
+    }
+
+    /// Whether its waves act against the motion, so that one way they cannot be told from a torque.
+    pub fn waves_oppose(&self) -> bool {
+        self.wave.is_some_and(|wave| wave(1.0, &Moment::default()).friction_nm != 0.0)
     }
 
     /// Whether it can be on a machine.

@@ -25,11 +25,14 @@ pub use acting::RobotLaws;
 pub use effect::{Effect, EffectError, EffectLaw};
 pub use feedforward::EffectFeedforward;
 pub use kind::{
-    Declared, EffectKind, Feedforward, Form, Grid, Parameter, Place, Role, Step, Trial, name_and_unit,
-    unit_of,
+    Declared, EffectKind, Feedforward, Form, Grid, Parameter, Place, Role, Signal, Step, Trial,
+    name_and_unit, unit_of,
 };
 pub use law::{Action, Law, Moment, Term};
 pub use machine::{Machine, MachineKind};
+
+pub(crate) use friction::{COULOMB_ERROR, FRICTION_ASYMMETRY, VISCOUS_ERROR};
+pub(crate) use parameters::INERTIA_ERROR;
 
 /// Every effect of the library.
 pub static KINDS: [&EffectKind; 35] = [
@@ -68,6 +71,18 @@ pub static KINDS: [&EffectKind; 35] = [
     &surroundings::EXTERNAL_PUSH,
     &sensors::GYRO_BIAS,
     &sensors::IMU_DELAY,
+];
+
+/// Those that are named before all others where several tell a log as well, in their order.
+pub(crate) static PREFERRED: [&EffectKind; 8] = [
+    &parameters::INERTIA_ERROR,
+    &friction::VISCOUS_ERROR,
+    &friction::COULOMB_ERROR,
+    &harmonics::COGGING,
+    &friction::QUADRATIC_DRAG,
+    &friction::VISCOUS_ASYMMETRY,
+    &friction::FRICTION_ASYMMETRY,
+    &actuator::COMMAND_DELAY,
 ];
 
 /// The effect with an id; none where the library has no such effect.

@@ -1,7 +1,7 @@
 //! Declared numbers of the body and the wheels that are off.
 
 use super::effect::Effect;
-use super::kind::{Declared, EffectKind, Feedforward, Parameter, Place, Trial};
+use super::kind::{Declared, EffectKind, Feedforward, Parameter, Place, Signal, Trial};
 use super::law::{Action, Moment, Term};
 use super::machine::MachineKind;
 use crate::model_file::{AxisModel, AxisParameters};
@@ -87,7 +87,7 @@ pub(super) static BODY_INERTIA_ERROR: EffectKind = EffectKind {
 };
 
 /// A declared I, or the mass of a carriage, that is wrong.
-pub(super) static INERTIA_ERROR: EffectKind = EffectKind {
+pub(crate) static INERTIA_ERROR: EffectKind = EffectKind {
     id: "inertia_error",
     summary: "inertia of each wheel with its rotor, of the shaft, or mass of the carriage that is off",
     place: Place::Parameter,
@@ -95,7 +95,7 @@ pub(super) static INERTIA_ERROR: EffectKind = EffectKind {
     parameters: &[Parameter::amplitude("inertia_kg_m2", [-100.0, 100.0], "what is added to it")
         .linear("mass_kg", [-1e4, 1e4])],
     wave: None,
-    trial: Trial::PLAIN,
+    trial: Trial::PLAIN.of(Signal::Acceleration),
     make_terms: |machine, _| {
         let key = INERTIA_ERROR.parameters[0].key(machine.kind);
         if machine.kind != MachineKind::Robot {

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::effects::{EffectKind, KINDS, Machine, MachineKind, Parameter, Place};
+use crate::effects::{EffectKind, Grid, KINDS, Machine, MachineKind, Parameter, Place, Signal};
 use crate::refine::select::Member;
 use crate::refine::whiten::Whitener;
 
@@ -47,7 +47,7 @@ impl Candidate {
             }
             columns = vec![sum];
         }
-        let noise = f64::from(u8::from(kind.id == "inertia_error"));
+        let noise = if kind.trial.signal == Signal::Acceleration { 1.0 } else { 0.0 };
         Self::of_columns(kind, whitener, shape, columns, (fixed, noise))
     }
 
@@ -80,12 +80,11 @@ impl Candidate {
 
     /// Whether its columns are made of the measured effort, which then explains itself.
     pub(super) fn uses_effort(&self) -> bool {
-        let other = ["load_dependent_friction", "torque_ripple"];
-        (self.kind.place == Place::Actuator && !self.is_gain()) || other.contains(&self.kind.id)
+        self.kind.trial.signal == Signal::MeasuredTorque
     }
 
     pub(super) fn is_gain(&self) -> bool {
-        self.kind.id == "torque_gain"
+        self.kind.trial.signal == Signal::WantedTorque
     }
 
     /// Its columns in a fit, from `first` on. While a shape is `searched` for, an effect without an amplitude has one.
@@ -148,9 +147,9 @@ impl Scales {
     }
 
     /// Values of a shape parameter that are worth a look, by its unit.
-    fn grid(&self, kind: &EffectKind, unit: &str) -> Vec<f64> {
+    fn grid(&self, kind: &EffectKind, parameter: &Parameter, machine: MachineKind) -> Vec<f64> {
         let times = |shares: &[f64], of: f64| shares.iter().map(|share| share * of).collect();
-        match unit {
+        match parameter.unit(machine) {
             "s" if kind.place == Place::Actuator => {
                 times(&[1.5, 3.0, 6.0, 12.0, 25.0], self.step_s.max(0.1 / self.cutoff_hz))
             }
@@ -161,7 +160,7 @@ impl Scales {
             }
             "rad" | "m" if kind.place == Place::Actuator => times(&[0.003, 0.01, 0.03], self.speed),
             "rad" | "m" => times(&[0.001, 0.003, 0.01, 0.03], self.speed),
-            "N m" | "N" if kind.id.contains("saturation") => {
+            _ if is_of_torque(parameter) => {
                 times(&[0.15, 0.22, 0.3, 0.4, 0.55, 0.7, 0.82, 0.92], self.largest_effort)
             }
             "N m" | "N" => times(&[0.05, 0.12, 0.25, 0.5], self.effort),
@@ -175,20 +174,23 @@ impl Scales {
 impl Scales {
     /// Lowest and highest value of a shape that a log can show.
     pub(super) fn seen(&self, kind: &EffectKind, parameter: &Parameter, machine: MachineKind) -> [f64; 2] {
-        let grid = self.grid(kind, parameter.unit(machine));
+        let grid = self.grid(kind, parameter, machine);
         let [low, high] =
             grid.iter().fold([f64::INFINITY, 0.0], |[low, high]: [f64; 2], &v| [low.min(v), high.max(v)]);
-        match kind.id {
+        match parameter.unit(machine) {
             _ if kind.series() => [0.0, f64::INFINITY],
             // Less than a row is the sampling's own.
-            "command_delay" | "actuator_lag" => [self.step_s, 2.0 * high],
-            "torque_saturation" => [0.5 * low, self.largest_effort],
-            _ if matches!(parameter.unit(machine), "rad/s" | "m/s") => {
-                [self.slowest.max(0.25 * low), 4.0 * high]
-            }
+            "s" if kind.place == Place::Actuator => [self.step_s, 2.0 * high],
+            _ if is_of_torque(parameter) => [0.5 * low, self.largest_effort],
+            "rad/s" | "m/s" => [self.slowest.max(0.25 * low), 4.0 * high],
             _ => [0.25 * low, 4.0 * high],
         }
     }
+}
+
+/// Whether a shape is a share of the largest torque.
+fn is_of_torque(parameter: &Parameter) -> bool {
+    matches!(parameter.grid, Grid::OfTorque(_))
 }
 
 /// What a twentieth of some values is below.
@@ -207,12 +209,10 @@ pub(super) fn library(
     (wanted, inertia): (&[f64], f64),
 ) -> Vec<Candidate> {
     let mut found = Vec::new();
-    for kind in KINDS.into_iter().filter(|kind| kind.is_on(machine.kind) && !kind.series()) {
-        // A springy body is the robot's.
-        if kind.id == "structural_mode" {
-            continue;
-        }
-        if kind.id == "torque_gain" {
+    // A body that gives way is the robot's.
+    let is_own = |kind: &&EffectKind| kind.is_on(machine.kind) && kind.place != Place::Pitch;
+    for kind in KINDS.into_iter().filter(is_own).filter(|kind| !kind.series()) {
+        if kind.trial.signal == Signal::WantedTorque {
             found.push(Candidate::gain(kind, whitener, wanted, inertia));
             continue;
         }
@@ -229,7 +229,7 @@ fn shapes(kind: &'static EffectKind, machine: MachineKind, scales: &Scales) -> V
     for parameter in kind.shapes() {
         let [low, high] = parameter.range(machine);
         let grid: Vec<f64> = scales
-            .grid(kind, parameter.unit(machine))
+            .grid(kind, parameter, machine)
             .into_iter()
             .filter(|value| (low..=high).contains(value))
             .collect();

@@ -1,6 +1,7 @@
 //! Whether the names that a search gives are wrong: something else explains what they do much better, or they explain
 //! little of what is to be explained.
 
+use crate::effects::Signal;
 use crate::refine::verdict::Found;
 
 use super::Left;
@@ -16,22 +17,22 @@ const FAR_OVER_FLOOR: f64 = 1.4;
 const LITTLE: f64 = 0.5;
 /// The same for the speed, where all effects are functions of the speed.
 const STILL_OVER_SPEED: f64 = 0.2;
-const OF_SPEED: [&str; 5] =
-    ["quadratic_drag", "viscous_asymmetry", "viscous_error", "coulomb_error", "low_speed_friction"];
 /// How many times less a function of one variable leaves than effects that are not the right ones.
 const BETTER: f64 = 2.5;
 
 /// Whether a smooth function of one variable explains the residual so much better than the effects do that their names
 /// are wrong.
 pub(super) fn misnamed([before, after]: [&Left; 2], effects: &[Found]) -> bool {
-    let [first_error, error] = [before, after].map(|left| left.fit.judged.error() / left.fit.blocks.rows() as f64);
+    let [first_error, error] =
+        [before, after].map(|left| left.fit.judged.error() / left.fit.blocks.rows() as f64);
     let explained = first_error - error;
-    let best = before.structure.iter().filter(|found| found.shows()).map(|found| found.gain).fold(0.0, f64::max);
+    let best =
+        before.structure.iter().filter(|found| found.shows()).map(|found| found.gain).fold(0.0, f64::max);
     let shown = || after.structure.iter().filter(|found| found.shows());
     let more = shown().map(|found| found.gain).fold(0.0, f64::max);
     let over_speed = shown().any(|found| found.variable == Variable::Speed && found.gain > STILL_OVER_SPEED);
-    if more > NEARLY_ALL || (over_speed && effects.iter().all(|found| OF_SPEED.contains(&found.effect.id())))
-    {
+    let of_speed = |found: &Found| found.effect.kind().trial.signal == Signal::Speed;
+    if more > NEARLY_ALL || (over_speed && effects.iter().all(of_speed)) {
         return true;
     }
     let rest = error / first_error;

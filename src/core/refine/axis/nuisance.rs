@@ -1,6 +1,6 @@
 //! Declared numbers that are estimated along, free or within their tolerances.
 
-use crate::effects::EffectKind;
+use crate::effects::{COULOMB_ERROR, EffectKind, FRICTION_ASYMMETRY, INERTIA_ERROR, VISCOUS_ERROR};
 use crate::identify::motion::kinematics::direction;
 use crate::identify::motion::place;
 use crate::refine::error::RefineError;
@@ -15,10 +15,11 @@ const OFFSET_OF_COULOMB: f64 = 0.01;
 const STRIBECK_OF_FASTEST: f64 = 0.5;
 /// How far a free inertia may be from the declared one, as a share of it.
 const FREE_INERTIA: [f64; 2] = [-0.99, 99.0];
-/// In the place of an effect: when the torque acts.
-const TIMING: &str = "timing";
 /// A sampled torque may act anywhere between its own row and the next.
 const TIMING_ROWS: f64 = 0.5;
+
+/// The effect that says the same as a number.
+type Said = Option<&'static EffectKind>;
 
 /// A declared number that is estimated along.
 pub(super) struct Nuisance {
@@ -30,42 +31,48 @@ pub(super) struct Nuisance {
     pub(super) tolerance: f64,
     pub(super) free: bool,
     /// The effect that says the same without a tolerance.
-    pub(super) effect: &'static str,
+    pub(super) effect: Said,
+    /// Whether it is the timing of the torque.
+    pub(super) is_timing: bool,
 }
 
 impl Nuisance {
     /// Whether it is the inertia or mass.
     pub(super) fn is_inertia(&self) -> bool {
-        self.effect == "inertia_error"
+        self.says(&INERTIA_ERROR)
     }
 
     /// Whether it is of the friction, its offset among them.
     pub(super) fn is_friction(&self) -> bool {
-        ["viscous_error", "coulomb_error", "friction_asymmetry"].contains(&self.effect)
+        self.opposes_motion() || self.is_offset()
+    }
+
+    /// Whether it is friction that is never below 0.
+    fn opposes_motion(&self) -> bool {
+        self.says(&VISCOUS_ERROR) || self.says(&COULOMB_ERROR)
+    }
+
+    /// Whether it is the torque that is there either way.
+    pub(super) fn is_offset(&self) -> bool {
+        self.says(&FRICTION_ASYMMETRY)
     }
 
     /// Whether an effect says the same.
     pub(super) fn says(&self, kind: &EffectKind) -> bool {
-        self.effect == kind.id
-    }
-
-    /// Whether it is the timing of the torque.
-    pub(super) fn is_timing(&self) -> bool {
-        self.effect == TIMING
+        self.effect == Some(kind)
     }
 
     pub(super) fn member(&self, column: usize) -> Member {
-        match (self.free, self.effect) {
-            (false, _) => Member::within(column, self.tolerance),
+        if !self.free {
+            Member::within(column, self.tolerance)
+        } else if self.is_inertia() {
             // An axis without inertia would take the torque for its own explanation.
-            (true, "inertia_error") => {
-                Member { bounds: FREE_INERTIA.map(|share| share * self.declared), ..Member::free(column) }
-            }
+            Member { bounds: FREE_INERTIA.map(|share| share * self.declared), ..Member::free(column) }
+        } else if self.opposes_motion() {
             // Friction takes power, it never gives any.
-            (true, "viscous_error" | "coulomb_error") => {
-                Member { bounds: [-self.declared, f64::INFINITY], ..Member::free(column) }
-            }
-            (true, _) => Member::free(column),
+            Member { bounds: [-self.declared, f64::INFINITY], ..Member::free(column) }
+        } else {
+            Member::free(column)
         }
     }
 
@@ -131,11 +138,11 @@ struct Along<'a> {
 
 impl Along<'_> {
     /// A number, unless it is neither free nor uncertain.
-    fn add(&mut self, index: usize, declared: f64, tolerance: f64, effect: &'static str, column: Vec<f64>) {
+    fn add(&mut self, index: usize, declared: f64, tolerance: f64, effect: Said, column: Vec<f64>) {
         let free = self.free[index];
         if free || tolerance > 0.0 {
             let key = self.declared.axis().keys()[index];
-            self.found.push(Nuisance { key, declared, column, tolerance, free, effect });
+            self.found.push(Nuisance { key, declared, column, tolerance, free, effect, is_timing: false });
         }
     }
 
@@ -144,23 +151,23 @@ impl Along<'_> {
     }
 
     /// A number that is off by a share of itself.
-    fn add_share(&mut self, index: usize, declared: f64, effect: &'static str, column: Vec<f64>) {
+    fn add_share(&mut self, index: usize, declared: f64, effect: Said, column: Vec<f64>) {
         self.add(index, declared, self.share(index) * declared, effect, column);
     }
 
     fn add_inertia(&mut self) {
         let column = self.rows.column(Trace::second_difference);
-        self.add_share(place::INERTIA, self.declared.inertia, "inertia_error", column);
+        self.add_share(place::INERTIA, self.declared.inertia, Some(&INERTIA_ERROR), column);
     }
 
     fn add_viscous(&mut self) {
         let column = self.rows.column(|trace| trace.speed.clone());
-        self.add_share(place::VISCOUS, self.declared.curve().viscous_nm_s_rad, "viscous_error", column);
+        self.add_share(place::VISCOUS, self.declared.curve().viscous_nm_s_rad, Some(&VISCOUS_ERROR), column);
     }
 
     fn add_coulomb(&mut self) {
         let column = against_motion(self.rows, |speed| 1.0 - self.fade(speed));
-        self.add_share(place::COULOMB, self.declared.curve().coulomb_nm, "coulomb_error", column);
+        self.add_share(place::COULOMB, self.declared.curve().coulomb_nm, Some(&COULOMB_ERROR), column);
     }
 
     /// How much of the static level is left at a speed; nothing of a curve without one.
@@ -180,7 +187,7 @@ impl Along<'_> {
         }
         let curve = self.declared.curve();
         let level = against_motion(self.rows, |speed| self.fade(speed));
-        self.add_share(place::STATIC, curve.static_nm, "", level);
+        self.add_share(place::STATIC, curve.static_nm, None, level);
         let drop = curve.static_nm - curve.coulomb_nm;
         const STEP: f64 = 1e-3;
         let slope = |rows: &Rows, step_scale: f64, step_exponent: f64| {
@@ -196,22 +203,23 @@ impl Along<'_> {
             (place::STRIBECK_SPEED, curve.stribeck_speed_rad_s, slope(self.rows, STEP, 0.0)),
             (place::STRIBECK_EXPONENT, curve.stribeck_exponent, slope(self.rows, 0.0, STEP)),
         ] {
-            self.add(index, declared, self.share(index), "", column);
+            self.add(index, declared, self.share(index), None, column);
         }
     }
 
     fn add_offset(&mut self) {
         let curve = self.declared.curve();
-        let tolerance = self.share(place::OFFSET) * curve.offset_nm.abs() + OFFSET_OF_COULOMB * curve.coulomb_nm;
+        let tolerance =
+            self.share(place::OFFSET) * curve.offset_nm.abs() + OFFSET_OF_COULOMB * curve.coulomb_nm;
         let column = self.rows.column(|trace| vec![1.0; trace.position.len()]);
-        self.add(place::OFFSET, curve.offset_nm, tolerance, "friction_asymmetry", column);
+        self.add(place::OFFSET, curve.offset_nm, tolerance, Some(&FRICTION_ASYMMETRY), column);
     }
 
     fn add_gravity(&mut self) {
         let (gravity, share) = (self.declared.gravity, self.share(place::GRAVITY));
         let sines = |trace: &Trace| trace.position.iter().map(|&angle| libm::sin(angle)).collect();
         if !self.declared.is_linear() {
-            self.add(place::GRAVITY, gravity, share * gravity.abs(), "", self.rows.column(sines));
+            self.add(place::GRAVITY, gravity, share * gravity.abs(), None, self.rows.column(sines));
         }
     }
 }
@@ -231,7 +239,8 @@ fn missing_stribeck(declared: &Declared, rows: &Rows) -> Option<Nuisance> {
         column: against_motion(rows, |speed| fading(speed, scale, curve.stribeck_exponent)),
         tolerance: level,
         free: false,
-        effect: "",
+        effect: None,
+        is_timing: false,
     })
 }
 
@@ -243,7 +252,8 @@ fn timing(rows: &Rows) -> Nuisance {
         column: rows.column(torque_rate),
         tolerance: TIMING_ROWS * rows.kernel.step_s,
         free: false,
-        effect: TIMING,
+        effect: None,
+        is_timing: true,
     }
 }
 

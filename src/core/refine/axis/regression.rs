@@ -111,20 +111,20 @@ impl Regression {
         let inertia = self.declared.inertia;
         let scales = Scales::new(&self.rows, inertia);
         let wanted = self.wanted();
-        let mut found =
-            library(&self.declared.machine, &self.rows, whitener, &scales, (&wanted, inertia));
+        let mut found = library(&self.declared.machine, &self.rows, whitener, &scales, (&wanted, inertia));
         let needs_effort =
             |candidate: &Candidate| matches!(candidate.kind.place, Place::Actuator | Place::Parameter);
         // What is free already is no effect that the model lacks.
-        let is_free =
-            |candidate: &Candidate| self.nuisances.iter().any(|known| known.free && known.says(candidate.kind));
+        let is_free = |candidate: &Candidate| {
+            self.nuisances.iter().any(|known| known.free && known.says(candidate.kind))
+        };
         found.retain(|candidate| (is_driven || !needs_effort(candidate)) && !is_free(candidate));
         found
     }
 
     /// Takes the timing of the torque out of the target, which is the log's and of no model.
     pub(super) fn take_out_timing(&mut self, whitener: &Whitener) {
-        let Some(timing) = self.nuisances.iter().find(|nuisance| nuisance.is_timing()) else { return };
+        let Some(timing) = self.nuisances.iter().find(|nuisance| nuisance.is_timing) else { return };
         let (column, white) = (whitener.apply(&timing.column), whitener.apply(&self.target));
         let blocks = Blocks::new(&[&column], &white, &vec![0; white.len()]);
         let noise = blocks.target_power() / blocks.rows().max(1) as f64;

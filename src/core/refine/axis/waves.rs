@@ -1,7 +1,6 @@
 //! Which harmonics of the position a residual has.
 
-use crate::effects::{EffectKind, KINDS, Machine};
-use crate::identify::motion::kinematics::direction;
+use crate::effects::{EffectKind, KINDS, Machine, Moment};
 use crate::refine::whiten::Whitener;
 
 use super::candidates::{Candidate, Scales, shape_of_wave, wave_numbers};
@@ -31,12 +30,12 @@ pub(super) fn strongest(
     let weights: Vec<Vec<f64>> = kinds
         .iter()
         .map(|kind| {
-            let weight = |&row: &usize| match kind.id {
-                "torque_ripple" => effort[row],
-                _ if against_motion(kind) => direction(speed[row]),
-                _ => 1.0,
+            let moment = |row: usize| Moment {
+                motor_speed_rad_s: speed[row],
+                torque_nm: effort[row],
+                ..Moment::default()
             };
-            chosen.iter().map(weight).collect()
+            chosen.iter().map(|&row| kind.wave_nm(&moment(row))).collect()
         })
         .collect();
     let gains = GainTable::new(rows, whitener);
@@ -74,11 +73,6 @@ pub(super) fn strongest(
         found.extend(new.take(CLOSELY).map(|shape| (kind, shape)));
     }
     found
-}
-
-/// Whether a kind of harmonics acts against the motion.
-pub(super) fn against_motion(kind: &EffectKind) -> bool {
-    kind.id == "position_dependent_friction"
 }
 
 /// The kernel's gain over angular frequency, and the power that kernel and whitening leave.

@@ -224,7 +224,7 @@ impl<'a> Search<'a> {
                 declared.filter(|nuisance| nuisance.declared > 0.0 && !nuisance.key.is_empty())
             {
                 let [low, high] = OFF_BY.map(|share| share * nuisance.declared);
-                if nuisance.effect != "friction_asymmetry" {
+                if !nuisance.is_offset() {
                     members.iter_mut().for_each(|member| member.bounds = [low, high]);
                 }
             }

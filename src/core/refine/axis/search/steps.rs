@@ -1,6 +1,6 @@
 //! Forward selection of effects: singles, pairs, and checks backward and on held-out rows.
 
-use crate::effects::EffectKind;
+use crate::effects::{EffectKind, PREFERRED};
 use crate::identify::quantile::student_t_975;
 use crate::refine::error::RefineError;
 use crate::refine::gain::Gain;
@@ -23,18 +23,8 @@ const MOST: usize = 12;
 /// Candidates whose left-out error is worked out, and those that are tried in pairs.
 const SHORT_LIST: usize = 24;
 const PAIRED: usize = 12;
-/// Share of the best gain from which on a candidate is as good, and which kinds are then named before others.
+/// Share of the best gain from which on a candidate is as good.
 const AS_GOOD: f64 = 0.97;
-const PREFERRED: [&str; 8] = [
-    "inertia_error",
-    "viscous_error",
-    "coulomb_error",
-    "cogging",
-    "quadratic_drag",
-    "viscous_asymmetry",
-    "friction_asymmetry",
-    "command_delay",
-];
 /// Half of the interval of a free number, as a share of it, above which the log hardly tells it.
 const VAGUE: f64 = 0.25;
 /// Share of a candidate's power that the declared numbers must leave for it to be testable.
@@ -108,8 +98,7 @@ impl Search<'_> {
         let waves =
             waves::strongest(self.machine, self.rows, &self.scales, self.whitener, &residual, &self.picks);
         // One way, friction that depends on the angle and a torque that does so are the same.
-        let waves =
-            waves.into_iter().filter(|(kind, _)| self.rows.both_ways() || !waves::against_motion(kind));
+        let waves = waves.into_iter().filter(|(kind, _)| self.rows.both_ways() || !kind.waves_oppose());
         Some(waves.map(|(kind, shape)| self.candidate(kind, shape)).collect())
     }
 
@@ -186,7 +175,7 @@ impl Search<'_> {
             && tried.judged.gain_over(base) > gains * self.thresholds.gain
     }
 
-    /// Of those that are as good as the best, the one that the library has first.
+    /// Of those that are as good as the best, the one that the library prefers.
     fn best_single(&self, round: &Round<'_>, base: &Judged, short: &[usize]) -> Option<Tried> {
         let singles: Vec<Tried> = short
             .iter()
@@ -198,7 +187,7 @@ impl Search<'_> {
         let most = singles.iter().map(gain).fold(0.0, f64::max);
         let rank = |tried: &Tried| {
             let kind = round.more[tried.chosen[0]].0.kind;
-            PREFERRED.iter().position(|id| *id == kind.id).unwrap_or(PREFERRED.len())
+            PREFERRED.iter().position(|own| *own == kind).unwrap_or(PREFERRED.len())
         };
         singles
             .into_iter()
