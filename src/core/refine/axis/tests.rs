@@ -296,7 +296,8 @@ const BENCH: &str = "name = \"R0\"\n[axis]\nkind = \"rotary\"\ninertia_kg_m2 = 0
 
 #[test]
 fn undeclared_cogging_of_a_bench_log_is_found() {
-    let logs = ["log", "heldout"].map(|part| shared_log(&format!("undeclared/example-bench/{part}.csv"), &[]));
+    let logs =
+        ["log", "heldout"].map(|part| shared_log(&format!("undeclared/example-bench/{part}.csv"), &[]));
     let [Some(log), Some(held_out)] = logs else { return };
     let found = refined(BENCH, &[log], &[held_out], &[]);
     assert_eq!(ids(&found), ["cogging"]);
@@ -340,6 +341,54 @@ fn between(log: &Log, times_s: std::ops::Range<f64>) -> Log {
 fn error_of(model: &Model, log: &Log) -> f64 {
     let quiet = &mut |_| ControlFlow::Continue(());
     residual(model, std::slice::from_ref(log), &Options::default(), quiet).unwrap().errors.rmse.main()
+}
+
+/// A motor whose torque constant has waves of two orders, which have one period in common, a whole turn, recorded with an
+/// encoder that counts from elsewhere.
+fn rippled(seed: u64, zero_rad: f64) -> Log {
+    let mut log = shaft(seed, |_, _, _| 0.0);
+    let angles = log.column("motor_angle_rad").unwrap().to_vec();
+    for column in &mut log.columns {
+        for (value, q) in column.values.iter_mut().zip(&angles) {
+            match &*column.name {
+                // What acts is 1 + ripple times what is asked for.
+                "torque_nm" => {
+                    *value /= 1.0 + 0.12 * (9.0 * q).cos() - 0.16 * (9.0 * q).sin() + 0.1 * (7.0 * q).cos()
+                }
+                "motor_angle_rad" => *value += zero_rad,
+                _ => {}
+            }
+        }
+    }
+    log
+}
+
+/// The zero is found within half a step of those that are tried, 24 in a period of the finest wave, and the error with it
+/// is that of the first record.
+#[test]
+fn another_zero_of_the_encoder_is_found_and_the_ripple_carries_over() {
+    const RIPPLE: &str = "[[effects]]\nid = \"torque_ripple\"\norder_1 = 9.0\ncos_1 = 0.12\nsin_1 = -0.16\n\
+                          order_2 = 7.0\ncos_2 = 0.1\nsin_2 = 0.0\n";
+    let text = SHAFT.to_owned() + RIPPLE;
+    let model = Model::from_toml(&text, "shaft.toml").unwrap();
+    let first = rippled(1, 0.0);
+    let before = error_of(&model, &first);
+    for zero_rad in [0.4, 2.0, 5.5] {
+        let again = rippled(2, zero_rad);
+        let found = refined(&text, &[first.clone(), again.clone()], &[], &[]);
+        let [ripple] = &found.carried[..] else { panic!("{:?}", found.carried) };
+        let [own, other] = ripple.zeros_rad[..] else { panic!("{ripple:?}") };
+        assert_eq!(own, 0.0);
+        assert!(
+            (other - (TAU - zero_rad)).abs() < 0.5 * TAU / (9.0 * 24.0),
+            "{other} for {}",
+            TAU - zero_rad
+        );
+        assert!(ripple.error_drop_ci95.is_some_and(|[low, _]| low > 25.0), "{ripple:?}");
+        assert_eq!(found.verdict, Verdict::ModelAdequate, "{:?}", ids(&found));
+        let after = error_of(&model, &again);
+        assert!((0.9..1.1).contains(&(after / before)), "{after} for {before}");
+    }
 }
 
 /// The first half of the record of a motor, refined, serves the second, though a function of the driver was switched

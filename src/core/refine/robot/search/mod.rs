@@ -1,5 +1,6 @@
 //! The regression: nuisances and chosen effects, judged by left-out blocks.
 
+mod forward;
 mod pushes;
 mod rivals;
 mod screen;

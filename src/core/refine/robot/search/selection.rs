@@ -1,9 +1,10 @@
-//! Forward selection with swaps and a backward check.
+//! What the search asks of an effect, and its backward checks.
 
 use crate::effects::{EffectKind, Step};
 use crate::parallel;
 use crate::refine::error::RefineError;
 
+use super::forward::{self, Problem};
 use super::screen::Screen;
 use super::{Candidate, Fit, Search};
 use crate::refine::robot::found::held_out_error;
@@ -25,10 +26,6 @@ const LEAST_IMPULSE_S: f64 = 0.0025;
 /// Time within which pushes are one, s, and the share of their gain that the strongest must have alone.
 const ONE_PUSH_S: f64 = 1.5;
 const MOST_OF_A_PUSH: f64 = 0.9;
-/// Most effects that are named.
-const MOST: usize = 6;
-/// Most looks for another one.
-const MOST_LOOKS: usize = 2 * MOST;
 /// Candidates whose shapes are refined and whose left-out error is worked out.
 const SHORT_LIST: usize = 14;
 const REFINED: usize = 5;
@@ -46,6 +43,58 @@ const LEFT_OF_FOUND: f64 = 1e-3;
 /// What a candidate costs against a rival that does as well.
 fn handicap(pick: &Candidate) -> f64 {
     HANDICAP[0] * pick.parameters() as f64 + HANDICAP[1] * (pick.kind.trial.caution - 1.0)
+}
+
+impl Problem for Search<'_> {
+    type Pick = Candidate;
+    type Fit = Fit;
+
+    fn fit(&self, picks: &[Candidate]) -> Option<Fit> {
+        Search::fit(self, picks)
+    }
+
+    fn score(&self, fit: &Fit) -> f64 {
+        fit.score
+    }
+
+    fn ranked(&self, picks: &[Candidate], now: &Fit) -> Vec<(Candidate, Fit)> {
+        Search::ranked(self, picks, now)
+    }
+
+    fn are_same(&self, a: &Candidate, b: &Candidate) -> bool {
+        a.kind == b.kind && a.shape == b.shape
+    }
+
+    fn handicap(&self, pick: &Candidate) -> f64 {
+        handicap(pick)
+    }
+
+    fn least(&self, score: f64) -> f64 {
+        Search::least(self, score)
+    }
+
+    fn least_of(&self, pick: &Candidate, score: f64) -> f64 {
+        Search::least_of(self, pick.kind, score)
+    }
+
+    fn is_worth(&self, picks: &[Candidate], before: &Fit, with: &Fit) -> bool {
+        let Some(last) = picks.last() else { return false };
+        // What the least is to a gain: by how much it is beyond.
+        let gain = before.score - with.score;
+        let beyond = gain / Search::least_of(self, last.kind, before.score);
+        if beyond <= 1.0 {
+            return false;
+        }
+        if last.kind.trial.brief {
+            let impulse = with.judged.coefficients[with.members.len() - 1].abs() * last.shape[1];
+            return impulse >= LEAST_IMPULSE_S * self.trace.machine.weight_n();
+        }
+        let needed = if gain > Search::least(self, before.score) { LEAST_Z } else { SURE_Z };
+        let is_sure = self.is_momentary(last) || self.z(last, with) > needed;
+        // What sticking mimics on clean robots too is in doubt however large it is.
+        let is_plain = last.kind.trial.caution <= 1.0;
+        is_sure && (is_plain && beyond > DOUBT || beyond > (self.by_chance)())
+    }
 }
 
 impl Search<'_> {
@@ -72,48 +121,12 @@ impl Search<'_> {
         &mut self,
         watch: &mut dyn FnMut(f64) -> Result<(), RefineError>,
     ) -> Result<(), RefineError> {
-        let Some(mut now) = self.fit(&[]) else { return Ok(()) };
-        // A swap may drop what was just added, and so on in a circle: looks are counted.
-        for look in 0..MOST_LOOKS {
-            watch(look as f64 / MOST_LOOKS as f64)?;
-            if self.picks.len() >= MOST {
-                break;
-            }
-            let ranked = self.ranked(&self.picks, &now);
-            if self.picks.is_empty() {
-                self.tried.clone_from(&ranked);
-            }
-            let Some((pick, fit)) = Self::first_of(ranked) else { break };
-            let mut picks = self.picks.clone();
-            picks.push(pick);
-            if !self.is_worth(&picks, &now, &fit) {
-                break;
-            }
-            self.picks = picks;
-            now = fit;
-            self.swap(&mut now);
+        let found = forward::select(self, self.picks.clone(), watch)?;
+        self.picks = found.picks;
+        if !found.tried.is_empty() {
+            self.tried = found.tried;
         }
         Ok(())
-    }
-
-    /// Whether the last pick is.
-    fn is_worth(&self, picks: &[Candidate], before: &Fit, with: &Fit) -> bool {
-        let Some(last) = picks.last() else { return false };
-        // What the least is to a gain: by how much it is beyond.
-        let gain = before.score - with.score;
-        let beyond = gain / self.least_of(last.kind, before.score);
-        if beyond <= 1.0 {
-            return false;
-        }
-        if last.kind.trial.brief {
-            let impulse = with.judged.coefficients[with.members.len() - 1].abs() * last.shape[1];
-            return impulse >= LEAST_IMPULSE_S * self.trace.machine.weight_n();
-        }
-        let needed = if gain > self.least(before.score) { LEAST_Z } else { SURE_Z };
-        let is_sure = self.is_momentary(last) || self.z(last, with) > needed;
-        // What sticking mimics on clean robots too is in doubt however large it is.
-        let is_plain = last.kind.trial.caution <= 1.0;
-        is_sure && (is_plain && beyond > DOUBT || beyond > (self.by_chance)())
     }
 
     /// Drops picks that are not far beyond what chance does and do not lower the error on rows that no fit has seen,
@@ -196,40 +209,6 @@ impl Search<'_> {
             .fold(0.0, f64::max)
     }
 
-    /// Replaces picks where another does better, and drops those that others have made needless.
-    fn swap(&mut self, now: &mut Fit) {
-        for _ in 0..2 {
-            let mut changed = false;
-            let mut place = 0;
-            while place < self.picks.len() && self.picks.len() > 1 {
-                let mut others = self.picks.clone();
-                let removed = others.remove(place);
-                let Some(without) = self.fit(&others) else { return };
-                if without.score - now.score < self.least_of(removed.kind, now.score) {
-                    self.picks = others;
-                    *now = without;
-                    changed = true;
-                    continue;
-                }
-                if let Some((pick, fit)) = self.best(&others, &without)
-                    && fit.score < now.score - 0.5 * self.least(now.score)
-                    && (pick.kind != removed.kind || pick.shape != removed.shape)
-                {
-                    others.insert(place, pick);
-                    if let Some(fit) = self.fit(&others) {
-                        self.picks = others;
-                        *now = fit;
-                        changed = true;
-                    }
-                }
-                place += 1;
-            }
-            if !changed {
-                return;
-            }
-        }
-    }
-
     /// Puts a kind with fewer parameters in the place of a pick where it does as well.
     pub(in crate::refine::robot) fn simplify(&mut self) {
         for place in 0..self.picks.len() {
@@ -255,17 +234,6 @@ impl Search<'_> {
             .filter(|(own, _)| *own < price)
             .min_by(|a, b| a.0.total_cmp(&b.0))
             .map(|(_, other)| other.clone())
-    }
-
-    /// The candidate that lowers the score most, its shape refined.
-    fn best(&self, picks: &[Candidate], now: &Fit) -> Option<(Candidate, Fit)> {
-        Self::first_of(self.ranked(picks, now))
-    }
-
-    fn first_of(ranked: Vec<(Candidate, Fit)>) -> Option<(Candidate, Fit)> {
-        // Where others do as well, what needs less is preferred.
-        let price = |(pick, fit): &(Candidate, Fit)| fit.score + handicap(pick);
-        ranked.into_iter().min_by(|a, b| price(a).total_cmp(&price(b)))
     }
 
     /// The most promising candidates, their shapes refined, with their fits beside the picks.
