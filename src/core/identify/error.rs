@@ -125,6 +125,14 @@ pub enum FitError {
         /// What that one holds.
         second_kind: &'static str,
     },
+    /// Data are wanting, and of what was recorded a part could not be read.
+    #[error("{refusal}; {unread}")]
+    Unread {
+        /// What is wanting.
+        refusal: Box<FitError>,
+        /// What could not be read, with lines and columns, and the mend.
+        unread: String,
+    },
     /// A robot on its wheels does not show its motors' friction alone.
     #[error(
         "{file}: a robot log gives friction only with the wheels in the air at constant speeds, record such a sweep"

@@ -69,6 +69,33 @@ pub fn fit(
     options: &FitOptions,
     watch: &mut dyn FnMut(&FitProgress) -> ControlFlow<()>,
 ) -> Result<FitReport, FitError> {
+    fit_read(logs, model, motor, options, watch).map_err(|error| with_unread(error, logs))
+}
+
+/// A refusal for want of data, with what of the logs could not be read.
+fn with_unread(refusal: FitError, logs: &[Log]) -> FitError {
+    let wants_data = matches!(
+        refusal,
+        FitError::NoPairs { .. }
+            | FitError::OneSpeed { .. }
+            | FitError::TooFewSpeeds { .. }
+            | FitError::Motion(MotionError::TooShort { .. } | MotionError::NothingExcited { .. })
+    );
+    let unread: Vec<String> = logs.iter().filter_map(Log::unread).collect();
+    if !wants_data || unread.is_empty() {
+        return refusal;
+    }
+    let unread = format!("{}; correct them there, or record the log again", unread.join("; "));
+    FitError::Unread { refusal: Box::new(refusal), unread }
+}
+
+fn fit_read(
+    logs: &[Log],
+    model: Option<&Model>,
+    motor: Motor,
+    options: &FitOptions,
+    watch: &mut dyn FnMut(&FitProgress) -> ControlFlow<()>,
+) -> Result<FitReport, FitError> {
     let contents =
         logs.iter().map(|log| content(log, model, motor, options)).collect::<Result<Vec<_>, _>>()?;
     let first = contents.first().ok_or(FitError::NoLogs)?;

@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 use super::test_data::{Noise, RIGHT, even_pairs};
 use super::*;
 use crate::friction::Stribeck;
-use crate::record::Log;
+use crate::record::{ColumnMap, Log, ReadOptions, read_log};
 use crate::shared::shared_log;
 
 const INERTIA: f64 = 0.005;
@@ -334,4 +334,27 @@ fn a_model_of_another_axis_is_refused() {
         fit(&[log], Some(&model), Motor::Left, &FitOptions::default(), &mut |_| ControlFlow::Continue(()));
     let error = result.unwrap_err().to_string();
     assert!(error.contains("bench.csv is a bench log") && error.contains("linear axis log"), "{error}");
+}
+
+#[test]
+fn a_refusal_for_want_of_data_names_the_cells_that_could_not_be_read() {
+    let pairs = "speed_rad_s,torque_nm\n1,0.1\n2,x\n3,0.3\n4,?\n5,0.5\nfast,0.6\n7,0.7\n8,0.8\n";
+    let quiet = &mut |_| ControlFlow::Continue(());
+    let map = ColumnMap::default();
+    let log = read_log(pairs.as_bytes(), "pairs.csv", &ReadOptions::new(&map), quiet).unwrap();
+    let refused = |logs: &[Log]| {
+        let watch = &mut |_: &FitProgress| ControlFlow::Continue(());
+        fit(logs, None, Motor::Left, &FitOptions::default(), watch).unwrap_err().to_string()
+    };
+    assert_eq!(
+        refused(std::slice::from_ref(&log)),
+        "the pairs of pairs.csv have 5 distinct speeds and six parameters need at least 6: record more speeds; 3 cells or \
+         rows of pairs.csv could not be read, `torque_nm` at lines 3, 5, `speed_rad_s` at line 7; correct them there, or \
+         record the log again"
+    );
+    // What is wanting for another reason is said without them.
+    let estimate = vec!["nonsense".to_owned()];
+    let options = FitOptions { estimate, ..FitOptions::default() };
+    let error = fit(&[log], None, Motor::Left, &options, &mut |_| ControlFlow::Continue(())).unwrap_err();
+    assert!(!error.to_string().contains("pairs.csv"), "{error}");
 }

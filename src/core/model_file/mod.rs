@@ -13,6 +13,7 @@ pub mod presets;
 mod refusal;
 mod robot_schema;
 mod tolerance;
+mod words;
 
 use std::borrow::Cow;
 
@@ -209,19 +210,8 @@ impl Model {
             ModelFileError { file: file.to_owned(), line, column, problem }
         };
         let start = |e: &toml::de::Error| e.span().map_or(0, |span| span.start);
-        let not_toml = |e: toml::de::Error| {
-            let found = line_around(text, start(&e));
-            error(
-                start(&e),
-                format!("{} in `{found}`: write it as key = value or [table]", in_words(e.message())),
-            )
-        };
-        let unread = |e: toml::de::Error| {
-            let found = line_around(text, start(&e));
-            let about_keys = e.message().contains("field `");
-            let place = if about_keys { String::new() } else { format!(" in `{found}`") };
-            error(start(&e), format!("{}{place}", in_words(e.message())))
-        };
+        let not_toml = |e: toml::de::Error| error(start(&e), words::not_toml(e.message(), text, start(&e)));
+        let unread = |e: toml::de::Error| error(start(&e), words::unread(e.message(), text, start(&e)));
         let document = toml::de::DeTable::parse(text).map_err(not_toml)?;
         let has = |table: &str| document.get_ref().contains_key(table);
         let model = match (has("robot"), has("axis")) {
@@ -257,23 +247,11 @@ impl Model {
     }
 }
 
-/// A message of the TOML reader in one line and without Rust's names.
-fn in_words(message: &str) -> String {
-    let line = message.split_whitespace().collect::<Vec<_>>().join(" ");
-    line.replace("f64", "a number").replace("an array of length", "a list of length")
-}
-
 /// Line and column, from 1, of a byte.
 fn position_at(text: &str, byte: usize) -> (usize, usize) {
     let before = &text.as_bytes()[..byte.min(text.len())];
     let line_start = before.iter().rposition(|&b| b == b'\n').map_or(0, |newline| newline + 1);
     (1 + before.iter().filter(|&&b| b == b'\n').count(), 1 + before.len() - line_start)
-}
-
-/// The line that a byte is in, cut to what a message can hold.
-fn line_around(text: &str, byte: usize) -> String {
-    let (line, _) = position_at(text, byte);
-    text.lines().nth(line - 1).unwrap_or_default().trim().chars().take(60).collect()
 }
 
 /// First byte of the deepest key of `path` that the document has; 0 where it has none. The key of a list is followed by
@@ -397,7 +375,7 @@ ground = [{}, { points_m = [[0.5, 0.0], [0.8, 0.03]] }]
             ("imu_rate_hz = 200.0", "imu_rate_hz = 300.0", 22, "divides 1000"),
             ("no_load_speed_rad_s = 60.0", "no_load_speed_rad_s = 50.0", 18, "above rated_speed_rad_s"),
             ("slope_rad = 0.05", "slope_rad = 2.0", 24, "slope_rad = 2 is out of range"),
-            ("delay_s = 0.006", "delay = 0.006", 20, "unknown field `delay`"),
+            ("delay_s = 0.006", "delay = 0.006", 20, "unknown key `delay`: write `delay_s`"),
         ] {
             let error = Model::from_toml(&WHOLE.replacen(old, new, 1), "m.toml").unwrap_err();
             assert!(
@@ -532,14 +510,18 @@ sin_1_n = 0.5
     #[test]
     fn each_mistake_is_named_with_its_line() {
         for (text, line, part) in [
-            (ROBOT.replace("com_height_m", "com_hight_m"), 7, "unknown field `com_hight_m`"),
+            (
+                ROBOT.replace("com_height_m", "com_hight_m"),
+                7,
+                "unknown key `com_hight_m`: write `com_height_m`, which is nearest, or take it out; known here: ",
+            ),
             (
                 ROBOT.replace("body_mass_kg = 13.0", "body_mass_kg = -13.0"),
                 3,
                 "body_mass_kg = -13 is out of range",
             ),
             (ROBOT.replace("static_nm = 0.0761", "static_nm = nan"), 11, "static_nm = NaN is out of range"),
-            (ROBOT.replace("wheel_radius_m = 0.1\n", ""), 2, "missing field `wheel_radius_m`"),
+            (ROBOT.replace("wheel_radius_m = 0.1\n", ""), 2, "missing key `wheel_radius_m`: add it here"),
             (ROBOT.replace("13.0", "\"heavy\""), 3, "`body_mass_kg = \"heavy\"`"),
             (ROBOT.replace("[lqr]", "[lqr]\nr = [[1.0, 0.0], [0.0, 1.0]]"), 17, "remove one"),
             (ROBOT.replace("r_diagonal = [20.0, 20.0]", ""), 16, "r_diagonal"),
@@ -561,6 +543,28 @@ sin_1_n = 0.5
                 "{error} (expected line {line}, {part})"
             );
             assert!(!error.to_string().contains('\n') && !error.problem.contains("f64"), "{error}");
+        }
+    }
+
+    /// A cut within a word, within a list, behind a value and within a table.
+    #[test]
+    fn a_file_that_was_cut_off_is_told_as_one() {
+        for (last, line, part) in [
+            ("wheel_ra", 6, "the file ends in the middle of `wheel_ra`: finish the line"),
+            ("q_diagonal = [60.0, 30", 17, "the file ends in the middle of `q_diagonal = [60.0, 30`"),
+            (
+                "wheel_inertia_kg_m2 = 0.00",
+                2,
+                "missing key `wheel_radius_m`: add it here; the file ends in this table",
+            ),
+            ("static_nm = 0.0761\n", 9, "cut off, take the whole one"),
+        ] {
+            let (before, _) = ROBOT.split_once(last).unwrap();
+            let error = Model::from_toml(&format!("{before}{last}"), "m.toml").unwrap_err();
+            assert!(
+                error.line == line && error.problem.contains(part),
+                "{error} (expected line {line}, {part})"
+            );
         }
     }
 }

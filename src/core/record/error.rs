@@ -27,6 +27,26 @@ impl fmt::Display for LineProblem {
     }
 }
 
+/// Where problems are, by their columns and lines.
+pub(super) fn places(problems: &[LineProblem]) -> String {
+    const LINES: usize = 4;
+    let mut columns: Vec<(&str, Vec<u64>)> = Vec::new();
+    for problem in problems {
+        match columns.iter_mut().find(|(column, _)| *column == problem.column) {
+            Some((_, lines)) => lines.push(problem.line),
+            None => columns.push((&problem.column, vec![problem.line])),
+        }
+    }
+    let told = columns.iter().map(|(column, lines)| {
+        let what = if column.is_empty() { "whole rows".to_owned() } else { format!("`{column}`") };
+        let shown = lines.iter().take(LINES).map(u64::to_string).collect::<Vec<_>>().join(", ");
+        let word = if lines.len() == 1 { "line" } else { "lines" };
+        let more = if lines.len() > LINES { ", …" } else { "" };
+        format!("{what} at {word} {shown}{more}")
+    });
+    told.collect::<Vec<_>>().join(", ")
+}
+
 /// Why a log could not be read; `file` is the name that the user gave it.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -131,7 +151,9 @@ pub enum LogError {
         present: String,
     },
     /// Most rows could not be used.
-    #[error("{file}: {bad} of {rows} rows cannot be used, the first at {first}")]
+    #[error(
+        "{file}: {bad} of {rows} rows cannot be used, the first at {problems}; correct them, or record the log again"
+    )]
     MostlyBad {
         /// The file.
         file: String,
@@ -139,8 +161,8 @@ pub enum LogError {
         bad: usize,
         /// Rows of the file.
         rows: usize,
-        /// The first problem.
-        first: LineProblem,
+        /// The first problem, and where all of them are.
+        problems: String,
     },
     /// Time repeats or runs back too often to drop the rows.
     #[error(

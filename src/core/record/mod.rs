@@ -116,6 +116,16 @@ impl Log {
         self.lines.line(row).filter(|_| row < self.rows())
     }
 
+    /// Cells and rows that could not be read, by their columns and lines; nothing where all could.
+    pub fn unread(&self) -> Option<String> {
+        let cells = match self.problem_count {
+            0 => return None,
+            1 => "1 cell or row".to_owned(),
+            count => format!("{count} cells or rows"),
+        };
+        Some(format!("{cells} of {} could not be read, {}", self.source, error::places(&self.problems)))
+    }
+
     /// Number of rows.
     pub fn rows(&self) -> usize {
         self.columns.first().map_or(0, |column| column.values.len())

@@ -255,6 +255,11 @@ fn files_that_are_no_logs_are_refused_with_place_and_mend() {
         ),
         (rows("0.1,2\n", 9), "run.csv: 9 of 9 rows cannot be used, the first at line 2: the row has 2 cells"),
         (
+            rows("0.1,x,2\n", 2),
+            "run.csv: 2 of 2 rows cannot be used, the first at line 2, column `motor_angle_rad`: `x` is not a number, the \
+             row was dropped; in all `motor_angle_rad` at lines 2, 3; correct them, or record the log again",
+        ),
+        (
             rows("0.5,1,2\n", 9),
             "run.csv:3: column `time_s` goes from 0.5 s to 0.5 s, and 8 rows in all do not follow the time before \
              them; write the time with more digits, or keep one row for each time",

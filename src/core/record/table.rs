@@ -1,6 +1,7 @@
 //! Rows of numbers on their way to columns.
 
 use super::cells::{Cells, Problems};
+use super::error::places;
 use super::plan::Plan;
 use super::text::{Header, Row};
 use super::time::{Misfits, misfits};
@@ -66,8 +67,11 @@ impl Table {
         let Problems { kept: problems, count: problem_count } = self.cells.problems;
         match problems.first() {
             Some(first) if dropped_rows * 2 > rows => {
-                let (file, first) = (file.to_owned(), first.clone());
-                return Err(LogError::MostlyBad { file, bad: dropped_rows, rows, first });
+                let problems = match problems.len() {
+                    1 => first.to_string(),
+                    _ => format!("{first}; in all {}", places(&problems)),
+                };
+                return Err(LogError::MostlyBad { file: file.to_owned(), bad: dropped_rows, rows, problems });
             }
             _ if rows == 0 => {
                 return Err(LogError::HeaderOnly { file: file.to_owned(), line: self.cells.header.line });

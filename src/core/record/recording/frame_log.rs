@@ -120,7 +120,7 @@ impl<'a, R: BufRead> FrameLog<'a, R> {
                 file: self.source.to_string(),
                 bad: self.damaged as usize,
                 rows: self.damaged as usize,
-                first: first.clone(),
+                problems: first.to_string(),
             }),
             _ => Ok(()),
         }
