@@ -38,7 +38,7 @@ pub mod whiten;
 use std::ops::ControlFlow;
 
 use crate::model_file::{AxisParameters, Model, Rig};
-use crate::record::{Log, LogKind};
+use crate::record::{HealthFinding, Log, LogKind, Severity};
 use crate::robot::Motor;
 
 pub use closed_loop::{ClosedLoop, Fed, LimitCycle, LoopPair, LoopRun, Spread};
@@ -78,6 +78,11 @@ type Watch<'a> = &'a mut dyn FnMut(f64) -> ControlFlow<()>;
 
 fn report(watch: Watch<'_>, share: f64) -> Result<(), RefineError> {
     if watch(share).is_break() { Err(RefineError::Cancelled) } else { Ok(()) }
+}
+
+/// Whether logs cannot answer.
+fn is_unfit(findings: &[HealthFinding]) -> bool {
+    findings.iter().any(|finding| finding.severity == Severity::Error)
 }
 
 /// How far a model is from logs of its machine.

@@ -19,11 +19,11 @@ mod tried;
 mod waves;
 
 use crate::model_file::Model;
-use crate::record::{HealthFinding, Log, Severity};
+use crate::record::{HealthFinding, Log};
 
 use super::error::RefineError;
 use super::verdict::{Errors, Found, Refinement, Residual, Verdict};
-use super::{Options, Watch, report};
+use super::{Options, Watch, is_unfit, report};
 use errors::{errors, rms};
 use floor::Floor;
 use leftover::Dependence;
@@ -73,10 +73,6 @@ pub(super) fn residual(
     data_health.extend(declared.told_from.and_then(beyond));
     let floor = Floor::new(declared, rows, Part::HeldOut, target);
     Ok(Residual { errors: errors(declared, rows, measured, target, &floor), tests, data_health })
-}
-
-fn is_unfit(findings: &[HealthFinding]) -> bool {
-    findings.iter().any(|finding| finding.severity == Severity::Error)
 }
 
 /// What a fit leaves.
@@ -215,7 +211,13 @@ impl End {
     }
 
     /// The answer, without what is said of the data.
-    fn refinement(self, model: &Model, options: &Options, asked: &Regression, search: &Search<'_>) -> Refinement {
+    fn refinement(
+        self,
+        model: &Model,
+        options: &Options,
+        asked: &Regression,
+        search: &Search<'_>,
+    ) -> Refinement {
         let Self { before, after, effects, wrong } = self;
         let Regression { declared, rows, measured, nuisances, .. } = asked;
         let floor = Floor::new(declared, rows, Part::HeldOut, &after.residual);

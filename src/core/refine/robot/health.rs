@@ -4,7 +4,7 @@ use crate::effects::Machine;
 use crate::model_file::RobotModel;
 use crate::record::runs::longest_run;
 use crate::record::{self, HealthFinding, Log, Severity};
-use crate::refine::rates;
+use crate::refine::{is_unfit, rates};
 
 use super::candidates::quantile;
 use super::motion::Readings;
@@ -35,10 +35,6 @@ const MANY: f64 = 5.0;
 const CROSS_S: f64 = 0.02;
 const CROSSED: f64 = 0.15;
 const CROSSED_Z: f64 = 4.0;
-
-pub(super) fn unfit(findings: &[HealthFinding]) -> bool {
-    findings.iter().any(|finding| finding.severity == Severity::Error)
-}
 
 /// Findings about logs as they are, those that are held out among them.
 pub(super) fn check<'a>(
@@ -90,7 +86,7 @@ fn of_log(log: &Log, readings: &Readings, robot: &RobotModel) -> Vec<HealthFindi
             found.push(error(name, "never changes".to_owned(), "check the sensor and its wire"));
         }
     }
-    if !unfit(&found) {
+    if !is_unfit(&found) {
         found.extend(of_signals(log, readings, robot));
     }
     found

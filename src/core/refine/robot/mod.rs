@@ -32,13 +32,13 @@ use std::num::NonZeroUsize;
 use crate::effects::{Form, Moment};
 use crate::identify::quantile::student_t_975;
 use crate::model_file::{Model, RobotModel};
-use crate::record::{HealthFinding, Log, LogKind, Severity};
+use crate::record::{HealthFinding, Log, LogKind};
 
 use super::error::RefineError;
 use super::verdict::{
     Channels as PerChannel, Corrected, Errors, Found, Quantity, Refinement, Residual, Verdict,
 };
-use super::{Explorer, Options, Variable, Watch, report};
+use super::{Explorer, Options, Variable, Watch, is_unfit, report};
 use candidates::library;
 use channels::Channels;
 use motion::Readings;
@@ -71,7 +71,7 @@ pub(super) fn residual(
     let mut data_health = health::check(pieces.iter().zip(&readings), robot);
     data_health.extend(gaps::findings(logs));
     report(watch, 0.3)?;
-    if health::unfit(&data_health) {
+    if is_unfit(&data_health) {
         return Ok(Residual { errors: Errors::default(), tests: Vec::new(), data_health });
     }
     let readings: Vec<Readings> = readings.into_iter().map(|r| r.acting(robot)).collect();
@@ -131,7 +131,7 @@ pub(super) fn refine(
     let read = pieces.iter().zip(&training).chain(held_pieces.iter().zip(&others));
     let mut data_health = health::check(read, robot);
     data_health.extend(gaps::findings(logs).into_iter().chain(gaps::findings(held_out)));
-    if health::unfit(&data_health) {
+    if is_unfit(&data_health) {
         return Ok(Refinement::unfit(model, data_health));
     }
     let is_late = torques_are_late(robot, &training);
@@ -141,7 +141,7 @@ pub(super) fn refine(
     let bias = found::gyro_bias(&training, &others);
     let mut trace = Trace::new(robot, training, others);
     data_health.extend(health::check_motion(&trace));
-    if data_health.iter().any(|finding| finding.severity == Severity::Error) {
+    if is_unfit(&data_health) {
         return Ok(Refinement::unfit(model, data_health));
     }
     let known = Known { tolerances: &model.tolerance, estimate: &options.estimate };

@@ -6,6 +6,7 @@ use super::*;
 use crate::effects::{Effect, MachineKind};
 use crate::friction::{Stribeck, StribeckParameters};
 use crate::model_file::{Rig, presets};
+use crate::record::Severity;
 use crate::robot::Motor;
 use crate::simulate::{self, ControllerChoice, Experiment, Scenario};
 
