@@ -1,6 +1,7 @@
 //! How quantities are named, scaled and shown.
 
 use flqr_core::effects::name_and_unit;
+use flqr_core::report::number::fixed;
 
 use crate::history::Channel;
 use crate::plot::Unit;
@@ -96,9 +97,7 @@ pub(crate) fn to_scale(value: f64, scale: f64) -> String {
         return format!("{value:.2e}").replace('-', "−");
     }
     let decimals = if scale > 0.0 { (2.0 - scale.log10().floor()).clamp(0.0, 7.0) as usize } else { 3 };
-    let text = format!("{value:.decimals$}");
-    let zero = text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.');
-    if zero { text.trim_start_matches('-').to_owned() } else { text.replace('-', "−") }
+    fixed(value, decimals)
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use egui::{Align2, Color32, FontId, Rangef, Rect, RichText, Ui, Visuals, vec2};
 use egui_plot::{AxisHints, GridInput, GridMark, HPlacement, Plot};
+use flqr_core::report::number::fixed;
 
 /// Width kept for a vertical axis, so that stacked plots line up.
 pub(crate) const Y_AXIS_WIDTH: f32 = 64.0;
@@ -221,9 +222,7 @@ fn tick(value: f64, step: f64) -> String {
         return format!("{value:.1e}").replace('-', "−");
     }
     let decimals = (-step.abs().log10().floor()).clamp(0.0, 9.0) as usize;
-    let text = format!("{value:.decimals$}");
-    let zero = text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.');
-    if zero { text.trim_start_matches('-').to_owned() } else { text.replace('-', "−") }
+    fixed(value, decimals)
 }
 
 #[cfg(test)]
