@@ -41,13 +41,7 @@ use crate::tab::Tab;
 use crate::tour::Tour;
 use crate::tune::TuneTab;
 use crate::window::WindowOptions;
-
-/// How saving ended.
-enum Saved {
-    Written,
-    /// There is a file that is not the loaded one; it is as before.
-    AnotherIsThere,
-}
+use crate::write_file::Saved;
 
 /// A model file job: what it is for, and its result.
 enum ModelJob {
@@ -266,6 +260,7 @@ impl App {
             has_log: self.friction.has_log(),
             fit_runs: self.friction.fit_is_running(),
             refine_runs: self.refine.is_running(),
+            has_residual: self.refine.has_residual(),
             experiment_runs: self.experiments.is_running(),
             is_connected: self.link.options().is_some(),
             is_hot: self.link.is_hot(),
@@ -391,9 +386,7 @@ impl App {
         self.experiments.note_runs(&mut self.runs);
         self.friction.note_run(&mut self.runs);
         self.refine.note_run(&mut self.runs);
-        for result in
-            [self.experiments.drain_saver(&self.waker), self.refine.drain_saver()].into_iter().flatten()
-        {
+        for result in [self.experiments.drain_saver(), self.refine.drain_saver()].into_iter().flatten() {
             match result {
                 Ok(message) => self.say(message),
                 Err(problem) => self.fail(problem),

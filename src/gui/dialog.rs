@@ -18,10 +18,10 @@ const FASTEST_PERSON: Duration = Duration::from_millis(150);
 fn instead(purpose: FilePurpose) -> &'static str {
     match purpose {
         FilePurpose::SaveModel
+        | FilePurpose::SaveFigure(_)
         | FilePurpose::SaveExperiment(_)
         | FilePurpose::Refine(RefineFile::Save(_)) => "type a path above and press Save",
         FilePurpose::SaveRecording => "type a path above and press Record",
-        FilePurpose::SaveFigure(_) => "type a path above and press Save figure",
         FilePurpose::OpenReplay => "type the path above",
         FilePurpose::SaveSession => "type a path and press OK",
         FilePurpose::OpenModel

@@ -2,11 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use egui::{Button, Key, TextEdit, Ui};
+use egui::{Button, Key, ProgressBar, RichText, TextEdit, Ui};
 
 use crate::job::{Job, Outcome, Reporter, Waker};
+use crate::picture::Shot;
 use crate::widgets::{choice_ui, error_ui, section_ui, warning_ui};
-use crate::write_file::write_file;
+use crate::write_file::{Files, Share, Written, bytes, write_files};
 
 /// What a page can save.
 pub(crate) trait FileKind: Copy + Default + PartialEq + 'static {
@@ -34,24 +35,8 @@ pub(crate) fn with_ending<K: FileKind>(path: PathBuf, kind: K) -> PathBuf {
     name.into()
 }
 
-/// Why a file was not written, and the mend.
-pub(crate) fn not_saved(path: &Path, error: &std::io::Error) -> String {
-    format!(
-        "{} could not be saved: {error}; check the folder, its permissions and the space on the disk.",
-        path.display()
-    )
-}
-
-/// Files with what is to be in them.
-pub(crate) type Files = Vec<(PathBuf, Vec<u8>)>;
-
-/// How a job of saving ended.
-#[derive(Debug)]
-enum Saved {
-    Written(Vec<PathBuf>),
-    /// These files are there already; nothing was written.
-    Exists(Vec<PathBuf>),
-}
+/// What is saved, where to, and whether it may replace what is there.
+pub(crate) type Target<K> = (K, PathBuf, bool);
 
 /// What is being written.
 struct Writing<K> {
@@ -59,7 +44,17 @@ struct Writing<K> {
     path: PathBuf,
     /// What has to be said of it.
     remark: Option<String>,
-    job: Job<(), Result<Saved, String>>,
+    share: Share,
+    job: Job<Share, Result<Written, String>>,
+}
+
+/// A picture of the window that was asked for.
+struct Awaited<K> {
+    target: Target<K>,
+    /// What the picture says of itself.
+    sources: Vec<String>,
+    shot: Shot,
+    waker: Waker,
 }
 
 /// What was asked for and would replace files.
@@ -77,10 +72,17 @@ pub(crate) struct Words<K> {
     pub(crate) save: fn(K) -> &'static str,
 }
 
+/// How a form is laid out.
+pub(crate) enum Layout {
+    /// In a column of a page, below a heading.
+    Column,
+    /// In a row above what is saved, after these words.
+    Row(&'static str),
+}
+
 /// What the form asks for.
 pub(crate) struct Asked<K> {
-    /// Save to this path; replace what is there if true.
-    pub(crate) save: Option<(K, PathBuf, bool)>,
+    pub(crate) save: Option<Target<K>>,
     /// Ask for a path with a dialog.
     pub(crate) dialog: Option<K>,
 }
@@ -92,6 +94,7 @@ pub(crate) struct SaveForm<K> {
     pub(crate) problem: Option<String>,
     pub(crate) focus_path: bool,
     path: String,
+    awaited: Option<Awaited<K>>,
     writing: Option<Writing<K>>,
     overwrite: Option<Overwrite<K>>,
     /// What was written last, and where to.
@@ -100,7 +103,7 @@ pub(crate) struct SaveForm<K> {
 
 impl<K: FileKind> SaveForm<K> {
     pub(crate) fn is_busy(&self) -> bool {
-        self.writing.is_some()
+        self.awaited.is_some() || self.writing.is_some()
     }
 
     /// What has been written since this was asked last.
@@ -118,10 +121,10 @@ impl<K: FileKind> SaveForm<K> {
         path
     }
 
-    /// Writes what `files` makes on a worker; existing files are replaced only if `replace`.
+    /// Writes what `files` makes on a worker; existing files are replaced only if the target says so.
     pub(crate) fn write(
         &mut self,
-        (kind, path, replace): (K, PathBuf, bool),
+        target: Target<K>,
         files: impl FnOnce(&Path) -> Result<Files, String> + Send + 'static,
         remark: Option<String>,
         waker: &Waker,
@@ -129,74 +132,105 @@ impl<K: FileKind> SaveForm<K> {
         if self.is_busy() {
             return Err("A file is still being written: try again when that has ended.".to_owned());
         }
+        let (kind, path, replace) = target;
         let asked = path.clone();
-        let work = move |_: &Reporter<()>| write_all(files(&asked)?, replace);
+        let work = move |reporter: &Reporter<Share>| {
+            write_files(files(&asked)?, replace, &mut |share| reporter.progress(share))
+        };
         let job = Job::start("save", waker, work)
             .map_err(|error| format!("No thread to write the file: {error}."))?;
-        self.writing = Some(Writing { kind, path, remark, job });
+        self.writing = Some(Writing { kind, path, remark, share: 0.0, job });
+        Ok(())
+    }
+
+    /// Writes a picture of the window as soon as it has come.
+    pub(crate) fn write_picture(
+        &mut self,
+        target: Target<K>,
+        sources: Vec<String>,
+        shot: Shot,
+        waker: &Waker,
+    ) -> Result<(), String> {
+        if self.is_busy() {
+            return Err("A file is still being written: try again when that has ended.".to_owned());
+        }
+        self.awaited = Some(Awaited { target, sources, shot, waker: Waker::clone(waker) });
         Ok(())
     }
 
     /// A sentence when something was written, or could not be.
     pub(crate) fn drain(&mut self) -> Option<Result<String, String>> {
-        let result = match self.writing.as_mut()?.job.poll().1 {
+        let said = self.drain_picture().or_else(|| self.drain_job());
+        if let Some(Err(problem)) = &said {
+            self.problem = Some(problem.clone());
+        }
+        said
+    }
+
+    fn drain_picture(&mut self) -> Option<Result<String, String>> {
+        let picture = self.awaited.as_ref()?.shot.poll()?;
+        let Awaited { target, sources, waker, .. } = self.awaited.take()?;
+        let written = picture.and_then(|picture| {
+            let png = move |path: &Path| Ok(vec![(path.to_owned(), bytes(picture.png(&sources)?))]);
+            self.write(target, png, None, &waker)
+        });
+        written.err().map(Err)
+    }
+
+    fn drain_job(&mut self) -> Option<Result<String, String>> {
+        let writing = self.writing.as_mut()?;
+        let (shares, outcome) = writing.job.poll();
+        writing.share = shares.last().copied().unwrap_or(writing.share);
+        let result = match outcome {
             Outcome::Running => return None,
             Outcome::Done(result) => result,
             Outcome::Broken => Err("Writing the file failed: this is a defect of flqr.".to_owned()),
         };
         let Writing { kind, path, remark, .. } = self.writing.take()?;
-        Some(match result {
-            Ok(Saved::Written(paths)) => {
+        Some(result.map(|written| match written {
+            Written::All(paths) => {
                 self.written = Some((kind, path));
                 let remark = remark.map(|remark| format!(" {remark}")).unwrap_or_default();
-                Ok(format!("Saved {}.{remark}", listed(&paths)))
+                format!("Saved {}.{remark}", listed(&paths))
             }
-            Ok(Saved::Exists(existing)) => {
+            Written::NoneAsThereAre(existing) => {
                 let verbs = if existing.len() == 1 { "exists and was" } else { "exist and were" };
                 let message = format!("{} {verbs} not replaced.", listed(&existing));
                 self.overwrite = Some(Overwrite { kind, path, existing });
-                Ok(message)
+                message
             }
-            Err(problem) => {
-                self.problem = Some(problem.clone());
-                Err(problem)
-            }
-        })
+            Written::Cancelled => format!("Cancelled: {} was not written.", path.display()),
+        }))
     }
 
-    /// `hint` comes below the buttons; `busy` where the page is at work for a file of its own.
+    /// `more` comes after the buttons.
     pub(crate) fn ui(
         &mut self,
         words: &Words<K>,
-        busy: bool,
-        hint: impl FnOnce(&mut Ui, K),
+        layout: Layout,
+        more: impl FnOnce(&mut Ui, K),
         ui: &mut Ui,
     ) -> Asked<K> {
-        section_ui(ui, "Save", |_| {});
-        ui.horizontal_wrapped(|ui| {
-            if choice_ui(ui, &mut self.kind, K::ALL) {
-                self.overwrite = None;
-                self.problem = None;
-                if !self.path.trim().is_empty() {
-                    let path = with_ending(self.path.trim().into(), self.kind);
-                    self.path = path.display().to_string();
-                }
-            }
-        });
-        let entered = self.path_ui(words, ui);
         let mut asked = Asked { save: None, dialog: None };
-        ui.horizontal_wrapped(|ui| {
-            let ready = !self.path.trim().is_empty() && !self.is_busy() && !busy;
-            let save = ui.add_enabled(ready, Button::new((words.save)(self.kind)));
-            let save = save.on_hover_text("An existing file is replaced only after a question");
-            if save.clicked() || (entered && ready) {
-                asked.save = Some((self.kind, PathBuf::from(self.path.trim()), false));
+        match layout {
+            Layout::Column => {
+                section_ui(ui, "Save", |_| {});
+                ui.horizontal_wrapped(|ui| self.kind_ui(ui));
+                let entered = self.path_ui(words, f32::INFINITY, ui);
+                ui.horizontal_wrapped(|ui| self.buttons_ui(words, entered, &mut asked, ui));
+                more(ui, self.kind);
             }
-            if ui.button("Choose…").on_hover_text("Choose where to save").clicked() {
-                asked.dialog = Some(self.kind);
+            Layout::Row(title) => {
+                ui.horizontal_wrapped(|ui| {
+                    ui.label(title);
+                    ui.scope(|ui| self.kind_ui(ui));
+                    let entered = self.path_ui(words, 220.0, ui);
+                    self.buttons_ui(words, entered, &mut asked, ui);
+                    more(ui, self.kind);
+                });
             }
-        });
-        hint(ui, self.kind);
+        }
+        self.progress_ui(ui);
         if let Some(problem) = &self.problem {
             error_ui(ui, problem);
         }
@@ -204,12 +238,47 @@ impl<K: FileKind> SaveForm<K> {
         asked
     }
 
+    fn kind_ui(&mut self, ui: &mut Ui) {
+        if choice_ui(ui, &mut self.kind, K::ALL) {
+            self.overwrite = None;
+            self.problem = None;
+            if !self.path.trim().is_empty() {
+                let path = with_ending(self.path.trim().into(), self.kind);
+                self.path = path.display().to_string();
+            }
+        }
+    }
+
+    fn buttons_ui(&mut self, words: &Words<K>, entered: bool, asked: &mut Asked<K>, ui: &mut Ui) {
+        let ready = !self.path.trim().is_empty() && !self.is_busy();
+        let save = ui.add_enabled(ready, Button::new((words.save)(self.kind)));
+        let save = save.on_hover_text("An existing file is replaced only after a question");
+        if save.clicked() || (entered && ready) {
+            asked.save = Some((self.kind, PathBuf::from(self.path.trim()), false));
+        }
+        if ui.button("Choose…").on_hover_text("Choose where to save").clicked() {
+            asked.dialog = Some(self.kind);
+        }
+    }
+
+    /// Only what takes its time has progress.
+    fn progress_ui(&self, ui: &mut Ui) {
+        let Some(writing) = self.writing.as_ref().filter(|writing| writing.share > 0.0) else { return };
+        ui.horizontal(|ui| {
+            if ui.button("Cancel saving").on_hover_text("Stop writing; no file is left").clicked() {
+                writing.job.cancel();
+            }
+            let text = format!("{}, {:.0} %", writing.path.display(), 100.0 * writing.share);
+            ui.add(ProgressBar::new(writing.share).text(RichText::new(text).small()));
+        });
+    }
+
     /// Whether a path was entered.
-    fn path_ui(&mut self, words: &Words<K>, ui: &mut Ui) -> bool {
+    fn path_ui(&mut self, words: &Words<K>, width: f32, ui: &mut Ui) -> bool {
         let [name, help] = words.path;
         let field = TextEdit::singleline(&mut self.path)
             .hint_text(format!("path, .{}", self.kind.extension()))
-            .desired_width(f32::INFINITY);
+            .desired_width(width);
         let field = ui.add(field).accessible_name(name);
         let entered = field.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
         if std::mem::take(&mut self.focus_path) {
@@ -244,20 +313,6 @@ fn listed(paths: &[PathBuf]) -> String {
     names.join(", ")
 }
 
-fn write_all(files: Files, replace: bool) -> Result<Saved, String> {
-    let paths = files.iter().map(|(path, _)| path);
-    let existing: Vec<_> = paths.filter(|path| path.symlink_metadata().is_ok()).cloned().collect();
-    if !replace && !existing.is_empty() {
-        return Ok(Saved::Exists(existing));
-    }
-    let mut written = Vec::new();
-    for (path, content) in files {
-        write_file(&path, &content).map_err(|error| not_saved(&path, &error))?;
-        written.push(path);
-    }
-    Ok(Saved::Written(written))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -273,19 +328,5 @@ mod tests {
         ] {
             assert_eq!(with_ending(name.into(), kind), PathBuf::from(expected));
         }
-    }
-
-    #[test]
-    fn nothing_is_written_where_one_of_several_files_exists() {
-        let folder = std::env::temp_dir().join(format!("flqr-save-{}", std::process::id()));
-        std::fs::create_dir_all(&folder).unwrap();
-        let [first, second] = ["a.csv", "b.csv"].map(|name| folder.join(name));
-        std::fs::write(&second, "precious").unwrap();
-        let files = || vec![(first.clone(), b"1".to_vec()), (second.clone(), b"2".to_vec())];
-        assert!(matches!(write_all(files(), false), Ok(Saved::Exists(paths)) if paths == [second.clone()]));
-        assert!(!first.exists());
-        assert!(matches!(write_all(files(), true), Ok(Saved::Written(paths)) if paths.len() == 2));
-        assert_eq!(std::fs::read_to_string(&second).unwrap(), "2");
-        std::fs::remove_dir_all(&folder).unwrap();
     }
 }

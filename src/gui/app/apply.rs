@@ -8,21 +8,22 @@ use flqr_core::model_file::{Model, Rig, presets};
 
 use super::keep::{self, absolute};
 use super::questions::{Question, Replacement};
-use super::{App, ModelJob, Saved};
+use super::{App, ModelJob};
 use crate::command::{Command, FilePurpose, Source, Target};
 use crate::command_line;
 use crate::commands::Palette;
 use crate::dialog::{Dialog, missing_portal};
 use crate::document::Base;
 use crate::friction::Fitted;
-use crate::job::{Job, Outcome};
+use crate::job::{Job, Outcome, Reporter};
 use crate::layout::Layout;
 use crate::live::LiveCommand;
-use crate::refine::{RefineCommand, RefineFile, Surroundings};
+use crate::refine::{RESIDUAL_STACK, RefineCommand, RefineFile, Surroundings};
 use crate::runs::RunsCommand;
 use crate::session::Session;
 use crate::tab::Tab;
 use crate::tour::Tour;
+use crate::write_file::{Saved, save_file};
 
 /// A model file larger than this is none.
 const LARGEST_MODEL_BYTES: u64 = 1 << 20;
@@ -180,7 +181,12 @@ impl App {
             Command::Order(order) => self.link.send(order),
             Command::ChooseReplay(path) => self.robot.form.replay = path.display().to_string(),
             Command::ChooseRecording(path) => self.robot.note_recording_path(&path),
-            Command::ChooseFigure(file, answer) => file.answer(ctx, answer),
+            Command::ChooseFigure(file, answer) => {
+                if file.stack == RESIDUAL_STACK {
+                    self.refine.show_residual();
+                }
+                file.answer(ctx, answer);
+            }
             Command::Runs(command) => {
                 if matches!(command, RunsCommand::OverlayLast | RunsCommand::FocusRows) {
                     self.commands.send(Command::SelectTab(Tab::Runs));
@@ -435,16 +441,11 @@ impl App {
         let path = if path.extension().is_none() { path.with_extension("toml") } else { path };
         let replace = replace || self.model_path.as_ref() == Some(&path);
         let (file, model) = (path.clone(), self.session.model());
-        let write = move |_: &crate::job::Reporter<()>| {
-            if !replace && file.symlink_metadata().is_ok() {
-                return Ok(Saved::AnotherIsThere);
-            }
+        let write = move |_: &Reporter<()>| {
             // Comments and order of the file that is replaced stay.
             let text = std::fs::read_to_string(&file)
                 .map_or_else(|_| model.to_toml(), |existing| model.to_toml_over(&existing));
-            crate::write_file::write_file(&file, text.as_bytes()).map(|()| Saved::Written).map_err(|error| {
-                format!("{} could not be saved: {error}; nothing was changed", file.display())
-            })
+            save_file(&file, &text, replace)
         };
         match Job::start("save-model", &self.waker, write) {
             Ok(job) => self.model_job = Some(ModelJob::Save(path, self.session.clone(), job)),

@@ -5,15 +5,15 @@ use std::path::{Path, PathBuf};
 use egui::{Context, Theme, ViewportCommand};
 use flqr_core::model_file::Model;
 
+use super::App;
 use super::questions::{Question, Replacement};
-use super::{App, Saved};
 use crate::command::Command;
 use crate::document::{self, Base, Content, Document, Left, Opened};
 use crate::job::{Job, Outcome, Reporter, Waker};
 use crate::plot::{degrees, set_degrees};
 use crate::refine::RefineCommand;
 use crate::session::Session;
-use crate::write_file::write_file;
+use crate::write_file::{Saved, save_file};
 
 /// A job on a session file: what was read of it, or that it was written.
 pub(super) enum SessionJob {
@@ -362,14 +362,7 @@ impl App {
         }
         let path = with_ending(path);
         let (file, document) = (path.clone(), self.document(ctx));
-        let write = move |_: &Reporter<()>| {
-            if !replace && file.symlink_metadata().is_ok() {
-                return Ok(Saved::AnotherIsThere);
-            }
-            write_file(&file, document.to_json().as_bytes()).map(|()| Saved::Written).map_err(|error| {
-                format!("{} could not be saved: {error}; nothing was changed", file.display())
-            })
-        };
+        let write = move |_: &Reporter<()>| save_file(&file, &document.to_json(), replace);
         match Job::start("save-session", &self.waker, write) {
             Ok(job) => self.session_job = Some(SessionJob::Save(path, job)),
             Err(error) => self.fail(format!("No thread to save the session: {error}.")),

@@ -526,10 +526,11 @@ fn export(s: &Situation<'_>, kind: FigureKind) -> Sent {
         Tab::Friction if s.has_log => "log",
         Tab::Experiments => "runs",
         Tab::Runs => "overlay",
-        Tab::Refine => return Err("“Export” is above the plot of the Residual step"),
+        Tab::Refine if s.has_residual => crate::refine::RESIDUAL_STACK,
+        Tab::Refine => return Err("“Find what is missing” brings the plots of this page"),
         Tab::Tune | Tab::Friction | Tab::Robot | Tab::Log => return Err("this page has no plots now"),
     };
-    let asks = "Type the path to save to, or browse.".to_owned();
+    let asks = "Type the path to save to, or choose it.".to_owned();
     Ok(Command::ChooseFigure(FigureFile { stack, kind }, Err(asks)))
 }
 

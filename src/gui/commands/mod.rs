@@ -57,6 +57,8 @@ pub(crate) struct Situation<'a> {
     pub(crate) has_log: bool,
     pub(crate) fit_runs: bool,
     pub(crate) refine_runs: bool,
+    /// Whether the Refine page has plots of a residual.
+    pub(crate) has_residual: bool,
     pub(crate) experiment_runs: bool,
     pub(crate) is_connected: bool,
     pub(crate) is_hot: bool,

@@ -28,7 +28,7 @@ use crate::job::Waker;
 use crate::panes::{MARGIN, Pane, panes_ui};
 use crate::plot::Marks;
 use crate::runs::RunsTab;
-use crate::save_form::FileKind;
+use crate::save_form::{FileKind, SaveForm};
 use crate::theme::palette;
 use crate::widgets::{empty_page_ui, error_ui, hint_ui, section_ui, warning_ui};
 use dials::{Dials, GREATEST_HEIGHT};
@@ -39,8 +39,8 @@ use preflight::Preflight;
 pub(crate) use run::Settings;
 use run::Variant;
 use runs::{Comparison, Runs};
+use save::Extent;
 pub(crate) use save::SavedAs;
-use save::{Extent, Saver};
 use side_view::{SideView, subject};
 use table::{Choice, StatisticsTable};
 
@@ -58,7 +58,7 @@ pub(crate) struct ExperimentsTab {
     marks: Marks,
     playback: Playback,
     table: StatisticsTable,
-    saver: Saver,
+    saver: SaveForm<SavedAs>,
     /// Where plots, robot and statistics were drawn.
     page: Rect,
     /// Height of the statistics when they were drawn last.
@@ -76,7 +76,7 @@ impl Default for ExperimentsTab {
             marks: Marks::new([0.0, 0.0]),
             playback: Playback::default(),
             table: StatisticsTable::default(),
-            saver: Saver::default(),
+            saver: SaveForm::default(),
             page: Rect::NOTHING,
             table_height: 290.0,
         }
@@ -112,7 +112,7 @@ impl ExperimentsTab {
 
     /// Starts both runs on `model`, which `path` holds if it is saved.
     pub(crate) fn start(&mut self, model: Model, path: Option<PathBuf>, waker: &Waker) -> Result<(), String> {
-        self.saver.form.problem = None;
+        self.saver.problem = None;
         self.runs
             .start(&self.settings, model, path, waker)
             .map_err(|error| format!("No thread for the runs: {error}."))
@@ -132,7 +132,7 @@ impl ExperimentsTab {
         };
         let visible_s = self.plots.stack.view.range();
         let extent = Extent { range_s: self.table.range(comparison, visible_s), visible_s };
-        self.saver.start(comparison, extent, (saved_as, path, replace), self.page, ctx, waker)
+        save::start(&mut self.saver, comparison, extent, (saved_as, path, replace), self.page, ctx, waker)
     }
 
     /// Another scenario for the next runs.
@@ -148,18 +148,18 @@ impl ExperimentsTab {
 
     /// Goes to the path to save to.
     pub(crate) fn focus_path(&mut self) {
-        self.saver.form.focus_path = true;
+        self.saver.focus_path = true;
     }
 
     pub(crate) fn note_dialog_problem(&mut self, purpose: FilePurpose, problem: &str) {
         if matches!(purpose, FilePurpose::SaveExperiment(_)) {
-            self.saver.form.problem = Some(problem.to_owned());
+            self.saver.problem = Some(problem.to_owned());
         }
     }
 
     /// A sentence when something was saved, or could not be.
-    pub(crate) fn drain_saver(&mut self, waker: &Waker) -> Option<Result<String, String>> {
-        self.saver.drain(waker)
+    pub(crate) fn drain_saver(&mut self) -> Option<Result<String, String>> {
+        self.saver.drain()
     }
 
     /// Gives the runs that have just ended their rows in the ledger.
@@ -228,8 +228,7 @@ impl ExperimentsTab {
     pub(crate) fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
         let arrows = !self.plots.stack.has_cursors();
         self.playback.keys(ui, arrows, &mut self.marks);
-        let form =
-            Pane::left(Part::Form, "Experiment", 260.0, 240.0..=420.0).in_front(self.saver.form.focus_path);
+        let form = Pane::left(Part::Form, "Experiment", 260.0, 240.0..=420.0).in_front(self.saver.focus_path);
         let Some(comparison) = self.runs.comparison().cloned() else {
             let panes = [form, Pane::middle(Part::Plots, "Plots", 300.0)];
             panes_ui(ui, "no experiment", &panes, |part, ui| match part {
@@ -267,7 +266,7 @@ impl ExperimentsTab {
         form::ui(context, form, &mut self.preflight, &self.runs, ui);
         self.outcome_ui(context, ui);
         if self.runs.comparison().is_some() {
-            self.saver.ui(context, ui);
+            save::ui(&mut self.saver, context, ui);
         }
     }
 

@@ -12,8 +12,9 @@ use crate::command::{Command, FilePurpose};
 use crate::context::ViewContext;
 use crate::job::Waker;
 use crate::picture::Shot;
-use crate::save_form::{FileKind, Files, SaveForm, Words};
+use crate::save_form::{FileKind, Layout, SaveForm, Target, Words};
 use crate::widgets::hint_ui;
+use crate::write_file::{Files, bytes};
 
 /// What is saved.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -73,84 +74,43 @@ const WORDS: Words<SavedAs> = Words {
     save: |_| "Save runs",
 };
 
-/// A picture that was asked for: where it goes, whether it may replace a file, what it says of itself.
-struct Pending {
-    path: PathBuf,
-    replace: bool,
-    sources: Vec<String>,
-    shot: Shot,
+/// Starts saving.
+pub(super) fn start(
+    form: &mut SaveForm<SavedAs>,
+    comparison: &Arc<Comparison>,
+    extent: Extent,
+    (saved_as, path, replace): Target<SavedAs>,
+    page: Rect,
+    ctx: &Context,
+    waker: &Waker,
+) -> Result<(), String> {
+    let path = form.begin(saved_as, path);
+    let target = (saved_as, path, replace);
+    if saved_as == SavedAs::Picture {
+        return form.write_picture(target, comparison.provenances(), Shot::ask(ctx, page), waker);
+    }
+    let comparison = Arc::clone(comparison);
+    form.write(target, move |path| files(saved_as, path, &comparison, extent), None, waker)
 }
 
-/// Form and jobs.
-#[derive(Default)]
-pub(super) struct Saver {
-    pub(super) form: SaveForm<SavedAs>,
-    picture: Option<Pending>,
-}
-
-impl Saver {
-    /// Starts saving; an existing file is replaced only if `replace`.
-    pub(super) fn start(
-        &mut self,
-        comparison: &Arc<Comparison>,
-        extent: Extent,
-        (saved_as, path, replace): (SavedAs, PathBuf, bool),
-        page: Rect,
-        ctx: &Context,
-        waker: &Waker,
-    ) -> Result<(), String> {
-        if self.picture.is_some() {
-            return Err("A file is still being written: try again when that has ended.".to_owned());
+pub(super) fn ui(form: &mut SaveForm<SavedAs>, context: &ViewContext<'_>, ui: &mut Ui) {
+    let hint = |ui: &mut Ui, saved_as| {
+        if saved_as == SavedAs::Logs {
+            hint_ui(ui, "Names of the controllers are added to the file's name.");
         }
-        let path = self.form.begin(saved_as, path);
-        if saved_as == SavedAs::Picture {
-            let (sources, shot) = (comparison.provenances(), Shot::ask(ctx, page));
-            self.picture = Some(Pending { path, replace, sources, shot });
-            return Ok(());
-        }
-        let comparison = Arc::clone(comparison);
-        let files = move |path: &Path| files(saved_as, path, &comparison, extent);
-        self.form.write((saved_as, path, replace), files, None, waker)
+    };
+    let asked = form.ui(&WORDS, Layout::Column, hint, ui);
+    if let Some((saved_as, path, replace)) = asked.save {
+        context.commands.send(Command::SaveExperiment { saved_as, path, replace });
     }
-
-    /// A sentence when something was written, or could not be.
-    pub(super) fn drain(&mut self, waker: &Waker) -> Option<Result<String, String>> {
-        if let Some(pending) = self.picture.take() {
-            match pending.shot.poll() {
-                Some(Ok(picture)) => {
-                    let Pending { path, replace, sources, .. } = pending;
-                    let png = move |path: &Path| Ok(vec![(path.to_owned(), picture.png(&sources)?)]);
-                    let asked = (SavedAs::Picture, path, replace);
-                    if let Err(problem) = self.form.write(asked, png, None, waker) {
-                        return Some(Err(problem));
-                    }
-                }
-                Some(Err(problem)) => return Some(Err(problem)),
-                None => self.picture = Some(pending),
-            }
-        }
-        self.form.drain()
-    }
-
-    pub(super) fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
-        let hint = |ui: &mut Ui, saved_as| {
-            if saved_as == SavedAs::Logs {
-                hint_ui(ui, "Names of the controllers are added to the file's name.");
-            }
-        };
-        let asked = self.form.ui(&WORDS, self.picture.is_some(), hint, ui);
-        if let Some((saved_as, path, replace)) = asked.save {
-            context.commands.send(Command::SaveExperiment { saved_as, path, replace });
-        }
-        if let Some(saved_as) = asked.dialog {
-            context.commands.send(Command::ShowDialog(FilePurpose::SaveExperiment(saved_as)));
-        }
+    if let Some(saved_as) = asked.dialog {
+        context.commands.send(Command::ShowDialog(FilePurpose::SaveExperiment(saved_as)));
     }
 }
 
 /// What goes where.
 fn files(saved_as: SavedAs, path: &Path, comparison: &Comparison, extent: Extent) -> Result<Files, String> {
-    let one = |text: String| vec![(path.to_owned(), text.into_bytes())];
+    let one = |text: String| vec![(path.to_owned(), bytes(text))];
     Ok(match saved_as {
         SavedAs::Logs => logs(path, comparison)?,
         SavedAs::Plots => one(report::chart(comparison, extent.visible_s).to_svg()),
@@ -168,7 +128,7 @@ fn logs(path: &Path, comparison: &Comparison) -> Result<Files, String> {
                 text.extend_from_slice(format!("# {row}\n").as_bytes());
             }
             write_log(&log, &mut text).map_err(|error| format!("the log has no text: {error}"))?;
-            files.push((log_path(path, variant.name(comparison.settings.scenario), suffix), text));
+            files.push((log_path(path, variant.name(comparison.settings.scenario), suffix), bytes(text)));
         }
     }
     Ok(files)

@@ -1,20 +1,18 @@
 //! Saving what a stack of plots shows: the visible samples as a log, the figure as SVG or PNG.
 
-use std::io::{self, BufWriter, Write};
-use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use std::io::{self, Write};
+use std::path::PathBuf;
 use std::sync::Arc;
 
-use egui::{Context, DragValue, Id, Key, ProgressBar, Rect, RichText, TextEdit, Ui};
+use egui::{Context, DragValue, Id, Rect, Ui};
 use flqr_core::record::LogWriter;
 use flqr_core::report::Chart;
 
 use super::decimate::Snapshot;
-use crate::job::{Job, Outcome, Reporter, Waker};
+use crate::job::Waker;
 use crate::picture::Shot;
-use crate::save_form::{FileKind, not_saved, with_ending};
-use crate::widgets::{choice_ui, error_ui, warning_ui};
-use crate::write_file::write_file_with;
+use crate::save_form::{FileKind, Layout, SaveForm, Target, Words, with_ending};
+use crate::write_file::{Content, Watch, bytes};
 
 /// What is saved of a figure.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -63,15 +61,16 @@ impl FigureFile {
         format!("{}.{}", self.stack, self.kind.extension())
     }
 
-    fn id(self) -> Id {
-        Id::unique(("figure file", self.stack))
-    }
-
     /// Hands the stack what a dialog brought; it saves when it is drawn next.
     pub(crate) fn answer(self, ctx: &Context, answer: Result<PathBuf, String>) {
-        ctx.data_mut(|data| data.insert_temp(self.id(), Answer(Some((self.kind, answer)))));
+        ctx.data_mut(|data| data.insert_temp(answer_id(self.stack), Answer(Some((self.kind, answer)))));
         ctx.request_repaint();
     }
+}
+
+/// Where a stack finds what a dialog brought for it.
+fn answer_id(stack: &'static str) -> Id {
+    Id::unique(("figure file", stack))
 }
 
 /// What a dialog brought for a figure.
@@ -79,230 +78,118 @@ impl FigureFile {
 struct Answer(Option<(FigureKind, Result<PathBuf, String>)>);
 
 /// What is to be written; `sources` say where the curves come from.
-pub(super) enum Content {
+pub(super) enum Figure {
     Log { x_key: &'static str, curves: Vec<(String, Snapshot)>, sources: Vec<String> },
     Chart(Box<Chart>, [f64; 2]),
     Picture { sources: Vec<String> },
 }
 
-enum Saved {
-    Written,
-    Exists,
-    Cancelled,
-}
+const WORDS: Words<FigureKind> = Words {
+    path: ["figure path", "The ending says what is saved: .csv, .svg or .png"],
+    save: |kind| match kind {
+        FigureKind::Csv => "Save data",
+        FigureKind::Svg => "Save figure",
+        FigureKind::Png => "Save picture",
+    },
+};
 
-/// Share of what is written, from 0 to 1.
-type Share = f32;
-
-/// Writes a figure.
-type SaveJob = Job<Share, Result<Saved, String>>;
-
-/// The form and what it has started.
-#[derive(Default)]
+/// The form that saves, and the size of an SVG.
 pub(super) struct Export {
     pub(super) open: bool,
-    pub(super) kind: FigureKind,
-    path: String,
-    focus_path: bool,
-    size: Option<[f64; 2]>,
-    shot: Option<(PathBuf, bool, Vec<String>, Shot)>,
-    job: Option<(PathBuf, SaveJob)>,
-    share: Share,
-    problem: Option<String>,
-    /// What is there already and was not replaced.
-    existing: Option<PathBuf>,
+    form: SaveForm<FigureKind>,
+    size_px: [f64; 2],
+}
+
+impl Default for Export {
+    fn default() -> Self {
+        Self { open: false, form: SaveForm::default(), size_px: [900.0, 600.0] }
+    }
 }
 
 /// What the form asks for.
 #[derive(Default)]
 pub(super) struct Asked {
-    /// Save to this path; replace what is there if true.
-    pub(super) save: Option<(PathBuf, bool)>,
-    pub(super) dialog: bool,
+    pub(super) save: Option<Target<FigureKind>>,
+    pub(super) dialog: Option<FigureKind>,
 }
 
 impl Export {
     /// Size of an SVG, px.
     pub(super) fn size(&self) -> [f64; 2] {
-        self.size.unwrap_or([900.0, 600.0])
+        self.size_px
     }
 
-    fn is_busy(&self) -> bool {
-        self.shot.is_some() || self.job.is_some()
+    /// Opens the form for a kind.
+    pub(super) fn open_as(&mut self, kind: FigureKind) {
+        (self.open, self.form.kind) = (true, kind);
     }
 
     pub(super) fn ui(&mut self, ui: &mut Ui, stack: &'static str) -> Asked {
+        let id = answer_id(stack);
+        let answer = ui.ctx().data_mut(|data| data.remove_temp::<Answer>(id)).and_then(|answer| answer.0);
         let mut asked = Asked::default();
-        let file = FigureFile { stack, kind: self.kind };
-        let answer = ui.ctx().data_mut(|data| data.remove_temp::<Answer>(file.id()));
-        match answer.and_then(|answer| answer.0) {
-            Some((kind, Ok(path))) => {
+        if let Some((kind, answer)) = answer {
+            self.open_as(kind);
+            match answer {
                 // The dialog has asked before replacing a file, though not about an ending added here.
-                let full = with_ending(path.clone(), kind);
-                let replace = full == path;
-                (self.open, self.kind) = (true, kind);
-                self.path = full.display().to_string();
-                asked.save = Some((full, replace));
+                Ok(path) => {
+                    let replace = with_ending(path.clone(), kind) == path;
+                    asked.save = Some((kind, path, replace));
+                }
+                Err(problem) => (self.form.focus_path, self.form.problem) = (true, Some(problem)),
             }
-            Some((kind, Err(problem))) => {
-                (self.open, self.kind, self.focus_path) = (true, kind, true);
-                self.problem = Some(problem);
-            }
-            None => {}
         }
         if self.open {
-            ui.horizontal_wrapped(|ui| self.form_ui(ui, &mut asked));
-            self.progress_ui(ui);
-            if let Some(problem) = &self.problem {
-                error_ui(ui, problem);
-            }
+            let size = &mut self.size_px;
+            let more = |ui: &mut Ui, kind| {
+                if kind == FigureKind::Svg {
+                    size_ui(ui, size);
+                }
+            };
+            let form = self.form.ui(&WORDS, Layout::Row("Export the visible range as"), more, ui);
+            asked.save = asked.save.or(form.save);
+            asked.dialog = form.dialog;
         }
         asked
     }
 
-    /// Only what takes its time has progress.
-    fn progress_ui(&self, ui: &mut Ui) {
-        let Some((path, job)) = self.job.as_ref().filter(|_| self.share > 0.0) else { return };
-        ui.horizontal(|ui| {
-            if ui.button("Cancel export").on_hover_text("Stop writing; no file is left").clicked() {
-                job.cancel();
-            }
-            let text = RichText::new(format!("{}, {:.0} %", path.display(), 100.0 * self.share)).small();
-            ui.add(ProgressBar::new(self.share).text(text));
-        });
-    }
-
-    fn form_ui(&mut self, ui: &mut Ui, asked: &mut Asked) {
-        ui.label("Export the visible range as");
-        ui.scope(|ui| choice_ui(ui, &mut self.kind, FigureKind::ALL));
-        if self.kind == FigureKind::Svg {
-            let mut size = self.size();
-            for (side, name) in size.iter_mut().zip(["figure width", "figure height"]) {
-                let field = DragValue::new(side).range(200.0..=10_000.0).speed(5.0).suffix(" px");
-                ui.add(field).accessible_name(name);
-            }
-            self.size = Some(size);
-        }
-        let hint = format!("path, .{}", self.kind.extension());
-        let field = TextEdit::singleline(&mut self.path).hint_text(hint).desired_width(220.0);
-        let field = ui.add(field).accessible_name("figure path");
-        if std::mem::take(&mut self.focus_path) {
-            field.request_focus();
-        }
-        let entered = field.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
-        if field.changed() {
-            (self.problem, self.existing) = (None, None);
-        }
-        let ready = !self.path.trim().is_empty() && !self.is_busy();
-        let save = ui.add_enabled(ready, egui::Button::new("Save figure"));
-        let save = save.on_hover_text("Save to the path; an existing file is replaced after a question");
-        if save.clicked() || (entered && ready) {
-            let path = with_ending(self.path.trim().into(), self.kind);
-            self.path = path.display().to_string();
-            asked.save = Some((path, false));
-        }
-        if ui.button("Browse…").on_hover_text("Choose where to save the figure").clicked() {
-            asked.dialog = true;
-        }
-        if let Some(path) = self.existing.clone() {
-            warning_ui(ui, format!("{} exists.", path.display()));
-            if ui.button("Replace it").on_hover_text("Replace what is there").clicked() {
-                asked.save = Some((path, true));
-            }
-        }
-    }
-
-    /// Starts to write; a sentence if it cannot.
-    pub(super) fn start(&mut self, ui: &Ui, (path, replace): (PathBuf, bool), content: Content, part: Rect) {
-        if self.is_busy() {
-            self.problem = Some("A figure is still being written: try again when that has ended.".to_owned());
-            return;
-        }
-        (self.problem, self.existing) = (None, None);
-        match content {
-            Content::Picture { sources } => {
-                self.shot = Some((path, replace, sources, Shot::ask(ui.ctx(), part)));
-            }
-            Content::Chart(chart, size) => {
-                self.write(ui, path, replace, move |file, _| file.write_all(chart.to_svg_of(size).as_bytes()))
-            }
-            Content::Log { x_key, curves, sources } => {
-                self.write(ui, path, replace, move |file, share| csv(x_key, &curves, &sources, file, share))
-            }
-        }
-    }
-
-    fn write(
+    /// Starts to write; what cannot be is said in the form.
+    pub(super) fn start(
         &mut self,
-        ui: &Ui,
-        path: PathBuf,
-        replace: bool,
-        content: impl FnOnce(&mut dyn Write, Watch<'_>) -> io::Result<()> + Send + 'static,
+        ctx: &Context,
+        (kind, path, replace): Target<FigureKind>,
+        figure: Figure,
+        part: Rect,
     ) {
-        let ctx = ui.ctx().clone();
-        let waker: Waker = Arc::new(move || ctx.request_repaint());
-        let file = path.clone();
-        let work = move |reporter: &Reporter<Share>| save(&file, replace, content, reporter);
-        self.share = 0.0;
-        match Job::start("save-figure", &waker, work) {
-            Ok(job) => self.job = Some((path, job)),
-            Err(error) => self.problem = Some(format!("No thread to write the figure: {error}.")),
-        }
+        let target = (kind, self.form.begin(kind, path), replace);
+        let wake = ctx.clone();
+        let waker: Waker = Arc::new(move || wake.request_repaint());
+        let content: Content = match figure {
+            Figure::Picture { sources } => {
+                let begun = self.form.write_picture(target, sources, Shot::ask(ctx, part), &waker);
+                return self.form.problem = begun.err();
+            }
+            Figure::Chart(chart, size) => bytes(chart.to_svg_of(size)),
+            Figure::Log { x_key, curves, sources } => {
+                Box::new(move |file, watch| csv(x_key, &curves, &sources, file, watch))
+            }
+        };
+        let begun = self.form.write(target, |path| Ok(vec![(path.to_owned(), content)]), None, &waker);
+        self.form.problem = begun.err();
     }
 
-    /// A sentence when something was written.
-    pub(super) fn drain(&mut self, ui: &Ui) -> Option<String> {
-        if let Some((path, replace, sources, shot)) = self.shot.take() {
-            match shot.poll() {
-                Some(Ok(picture)) => self.write(ui, path, replace, move |file, _| {
-                    file.write_all(&picture.png(&sources).map_err(io::Error::other)?)
-                }),
-                Some(Err(problem)) => self.problem = Some(problem),
-                None => self.shot = Some((path, replace, sources, shot)),
-            }
-        }
-        let (path, mut job) = self.job.take()?;
-        let (shares, outcome) = job.poll();
-        self.share = shares.last().copied().unwrap_or(self.share);
-        match outcome {
-            Outcome::Running => self.job = Some((path, job)),
-            Outcome::Done(Ok(Saved::Written)) => return Some(format!("Saved {}.", path.display())),
-            Outcome::Done(Ok(Saved::Cancelled)) => {
-                return Some(format!("Cancelled: {} was not written.", path.display()));
-            }
-            Outcome::Done(Ok(Saved::Exists)) => self.existing = Some(path),
-            Outcome::Done(Err(problem)) => self.problem = Some(problem),
-            Outcome::Broken => {
-                self.problem = Some("Writing the figure failed: this is a defect of flqr.".to_owned());
-            }
-        }
-        None
+    /// A sentence when something was written; what could not be is said in the form.
+    pub(super) fn drain(&mut self) -> Option<String> {
+        self.form.drain()?.ok()
     }
 }
 
-fn save(
-    path: &Path,
-    replace: bool,
-    content: impl FnOnce(&mut dyn Write, Watch<'_>) -> io::Result<()>,
-    reporter: &Reporter<Share>,
-) -> Result<Saved, String> {
-    if !replace && path.symlink_metadata().is_ok() {
-        return Ok(Saved::Exists);
-    }
-    let written = write_file_with(path, |file| {
-        let mut file = BufWriter::with_capacity(1 << 16, file);
-        content(&mut file, &mut |share| reporter.progress(share))?;
-        file.flush()
-    });
-    match written {
-        Ok(()) => Ok(Saved::Written),
-        Err(_) if reporter.is_cancelled() => Ok(Saved::Cancelled),
-        Err(error) => Err(not_saved(path, &error)),
+fn size_ui(ui: &mut Ui, size_px: &mut [f64; 2]) {
+    for (side, name) in size_px.iter_mut().zip(["figure width", "figure height"]) {
+        let field = DragValue::new(side).range(200.0..=10_000.0).speed(5.0).suffix(" px");
+        ui.add(field).accessible_name(name);
     }
 }
-
-/// Is told the share that is written, and may break off.
-type Watch<'w> = &'w mut dyn FnMut(Share) -> ControlFlow<()>;
 
 /// Rows between two reports of progress.
 const WATCH_ROWS: usize = 8192;
@@ -355,9 +242,12 @@ fn one_line(text: &str) -> String {
 mod tests {
     use flqr_core::record::{ColumnMap, ReadOptions, read_log};
 
+    use std::ops::ControlFlow;
+
     use super::*;
 
     use super::super::decimate::{Data, DecimationCache};
+    use crate::write_file::{Written, write_files};
 
     fn snapshot(x: &[f64], y: &[f64]) -> Snapshot {
         DecimationCache::default().indexed(Data::Fixed(x, y), [1.0, 1.0], 1).snapshot(0..x.len())
@@ -401,15 +291,13 @@ mod tests {
         let x: Vec<f64> = (0..3 * WATCH_ROWS).map(|row| row as f64).collect();
         let curve = [("a".to_owned(), snapshot(&x, &x))];
         let path = std::env::temp_dir().join(format!("flqr-cancelled-{}.csv", std::process::id()));
-        let shares = Arc::new(std::sync::Mutex::new(Vec::new()));
-        let seen = Arc::clone(&shares);
-        let written = write_file_with(&path, |file| {
-            csv("time_s", &curve, &[], file, &mut |share| {
-                seen.lock().unwrap().push(share);
-                if share < 0.5 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
-            })
+        let content: Content = Box::new(move |file, watch| csv("time_s", &curve, &[], file, watch));
+        let mut shares = Vec::new();
+        let written = write_files(vec![(path.clone(), content)], false, &mut |share| {
+            shares.push(share);
+            if share < 0.5 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         });
-        assert!(written.is_err() && !path.exists());
-        assert_eq!(*shares.lock().unwrap(), [1.0 / 3.0, 2.0 / 3.0]);
+        assert!(matches!(written, Ok(Written::Cancelled)) && !path.exists());
+        assert_eq!(shares, [1.0 / 3.0, 2.0 / 3.0]);
     }
 }

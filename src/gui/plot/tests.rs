@@ -240,13 +240,13 @@ fn the_visible_range_is_saved_and_nothing_is_replaced_unasked() {
     save(&mut window, "CSV", "range.csv");
     for _ in 0..200 {
         window.step();
-        if window.query_by_label("Replace it").is_some() {
+        if window.query_by_label("Replace").is_some() {
             break;
         }
         std::thread::sleep(std::time::Duration::from_millis(2));
     }
     assert!(std::fs::read_to_string(folder.join("range.csv")).unwrap().starts_with("precious"));
-    click(&mut window, "Replace it");
+    click(&mut window, "Replace");
     let replaced =
         || std::fs::read_to_string(folder.join("range.csv")).is_ok_and(|text| text.starts_with("# run 3"));
     for _ in 0..500 {
@@ -272,6 +272,13 @@ fn without_a_dialog_the_form_says_why_once_and_waits_for_a_path() {
     window.run_steps(2);
     assert!(window.query_by_label("There is no file dialog here.").is_none(), "typing answers it");
     window.get_by_label("figure width");
+    window.get_by_label("Save figure");
+    window.key_press_modifiers(Modifiers::COMMAND, Key::A);
+    window.step();
+    window.event(Event::Text("a.csv".to_owned()));
+    window.run_steps(2);
+    window.get_by_label("Save data");
+    assert!(window.query_by_label("figure width").is_none(), "the ending says what is saved");
 }
 
 #[test]

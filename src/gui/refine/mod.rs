@@ -32,7 +32,9 @@ use crate::save_form::{FileKind, SaveForm};
 use crate::session::Session;
 use crate::theme::palette;
 use crate::widgets::{empty_page_ui, hint_ui, section_ui, warning_ui};
+use crate::write_file::bytes;
 pub(crate) use command::{RefineCommand, RefineFile};
+pub(crate) use residual::RESIDUAL_STACK;
 use residual::ResidualStep;
 pub(crate) use run::Question;
 use run::{Answered, Drained, Made, Run, Settings, is_of_demo};
@@ -121,6 +123,16 @@ impl RefineTab {
     pub(crate) fn log_files(&self) -> Vec<(PathBuf, bool)> {
         let files = self.sources.list.iter().filter(|source| !source.is_made());
         files.map(|source| (source.path.clone(), source.held_out)).collect()
+    }
+
+    /// Whether there are plots of a residual.
+    pub(crate) fn has_residual(&self) -> bool {
+        residual::has_plots(self.run.refined.as_ref())
+    }
+
+    /// Goes to the plots of the residual.
+    pub(crate) fn show_residual(&mut self) {
+        self.step = Step::Residual;
     }
 
     pub(crate) fn is_running(&self) -> bool {
@@ -269,7 +281,7 @@ impl RefineTab {
             }
         };
         let path = self.saver.begin(saved_as, path);
-        let files = move |path: &Path| Ok(vec![(path.to_owned(), content().into_bytes())]);
+        let files = move |path: &Path| Ok(vec![(path.to_owned(), bytes(content()))]);
         self.saver.write((saved_as, path, replace), files, remark, around.waker)?;
         self.saving = saving;
         Ok(())

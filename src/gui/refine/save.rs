@@ -5,7 +5,7 @@ use egui::Ui;
 use super::command::{RefineCommand, RefineFile};
 use crate::command::{Command, FilePurpose};
 use crate::context::ViewContext;
-use crate::save_form::{FileKind, SaveForm, Words};
+use crate::save_form::{FileKind, Layout, SaveForm, Words};
 
 /// What is saved.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -50,7 +50,7 @@ const WORDS: Words<SavedAs> = Words {
 };
 
 pub(super) fn ui(form: &mut SaveForm<SavedAs>, context: &ViewContext<'_>, ui: &mut Ui) {
-    let asked = form.ui(&WORDS, false, |_, _| {}, ui);
+    let asked = form.ui(&WORDS, Layout::Column, |_, _| {}, ui);
     if let Some((saved_as, path, replace)) = asked.save {
         context.commands.send(Command::Refine(RefineCommand::Save { saved_as, path, replace }));
     }

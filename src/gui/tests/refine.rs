@@ -6,7 +6,7 @@ mod common;
 
 use std::ops::ControlFlow;
 
-use common::{SIZE, TempFile, Window, click, enter, open, options, random_input, state, until};
+use common::{SIZE, TempFile, Window, click, command, enter, open, options, random_input, state, until};
 use egui::{Key, Modifiers, Vec2, vec2};
 use egui_kittest::kittest::Queryable;
 use flqr_core::model_file::Model;
@@ -72,6 +72,10 @@ fn what_a_log_shows_is_found_and_goes_into_the_model() {
     assert!(effects.iter().any(|effect| effect["id"] == "cogging"), "{tab:#}");
     assert_eq!((&tab["step"], &tab["standing"]), (&"add".into(), &"fresh".into()));
     assert_eq!(tab["command"], format!("flqr refine MODEL.toml {} --seed 1", log.name()));
+    command(&mut window, "plots of this page as csv");
+    assert_eq!(state(&window)["refine_tab"]["step"], "residual");
+    window.get_by_label("figure path");
+    show(&mut window, "add");
     click(&mut window, "Use in the model");
     let used = state(&window);
     assert_eq!(used["unsaved_changes"], true);

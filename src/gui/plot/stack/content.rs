@@ -1,15 +1,15 @@
 //! What an export of a stack is made of.
 
 use super::{Panel, Stack, cache, indexed};
-use crate::plot::export::{Content, FigureKind};
+use crate::plot::export::{Figure, FigureKind};
 use crate::plot::figure;
 
 impl Stack {
     /// What is to be written of the visible range.
-    pub(super) fn content(&mut self, shown: &[&Panel<'_>]) -> Content {
+    pub(super) fn figure(&mut self, shown: &[&Panel<'_>], kind: FigureKind) -> Figure {
         let (range, units) = (self.view.range(), self.units);
-        match self.export.kind {
-            FigureKind::Png => Content::Picture { sources: self.sources.clone() },
+        match kind {
+            FigureKind::Png => Figure::Picture { sources: self.sources.clone() },
             FigureKind::Csv => {
                 let caches = &mut self.caches;
                 let curves =
@@ -19,7 +19,7 @@ impl Stack {
                         cache(caches, panel, curve).indexed(curve.data, [1.0, curve.gap], curve.generation);
                     (curve.key.to_string(), data.snapshot(data.inside(range)))
                 });
-                Content::Log { x_key: self.x[1], curves: curves.collect(), sources: self.sources.clone() }
+                Figure::Log { x_key: self.x[1], curves: curves.collect(), sources: self.sources.clone() }
             }
             FigureKind::Svg => {
                 let mut drawn = Vec::new();
@@ -33,7 +33,7 @@ impl Stack {
                     drawn.push(figure::panel(&panel.name, panel.shown_unit(units), curves, &panel.limits));
                 }
                 let chart = figure::chart(self.name, self.x[0], range, drawn, &self.sources);
-                Content::Chart(Box::new(chart), self.export.size())
+                Figure::Chart(Box::new(chart), self.export.size())
             }
         }
     }

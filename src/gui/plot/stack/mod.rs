@@ -13,7 +13,7 @@ use egui::{Color32, Key, Modifiers, Rect, Ui};
 
 use super::cursors::{Cursors, steps};
 use super::decimate::{Data, DecimationCache, Indexed};
-use super::export::{Export, FigureFile};
+use super::export::{Export, FigureFile, FigureKind};
 use super::marks::{Marks, Moved};
 use super::spectra::Spectra;
 use super::unit::{Unit, UnitChoice, degrees};
@@ -127,7 +127,7 @@ struct Around<'m, 'p> {
     marks: Option<&'m mut Marks>,
     all: &'p [Panel<'p>],
     wishes: Wishes,
-    dialog: bool,
+    dialog: Option<FigureKind>,
 }
 
 impl Stack {
@@ -206,7 +206,7 @@ impl Stack {
     pub fn show_marked(&mut self, ui: &mut Ui, panels: &[Panel<'_>], marks: Option<&mut Marks>) -> Wishes {
         self.units.degrees = degrees(ui.ctx());
         let asked = self.export.ui(ui, self.name);
-        let said = self.export.drain(ui);
+        let said = self.export.drain();
         let mut around =
             Around { marks, all: panels, wishes: Wishes { said, ..Wishes::default() }, dialog: asked.dialog };
         self.forget_others(panels);
@@ -223,10 +223,10 @@ impl Stack {
         let right = ui.max_rect().right();
         self.page = Rect::from_min_max(top, egui::pos2(right, ui.next_widget_position().y));
         let Around { mut wishes, dialog, .. } = around;
-        wishes.dialog = dialog.then_some(FigureFile { stack: self.name, kind: self.export.kind });
-        if let Some(save) = asked.save {
-            let content = self.content(&shown);
-            self.export.start(ui, save, content, self.page);
+        wishes.dialog = dialog.map(|kind| FigureFile { stack: self.name, kind });
+        if let Some(target) = asked.save {
+            let figure = self.figure(&shown, target.0);
+            self.export.start(ui.ctx(), target, figure, self.page);
         }
         wishes
     }

@@ -116,7 +116,8 @@ impl Stack {
             (FigureKind::Png, "Picture as PNG…"),
         ] {
             if ui.button(text).clicked() {
-                (self.export.open, self.export.kind, around.dialog) = (true, kind, true);
+                self.export.open_as(kind);
+                around.dialog = Some(kind);
             }
         }
     }

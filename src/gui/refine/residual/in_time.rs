@@ -7,6 +7,9 @@ use crate::command::Commands;
 use crate::plot::{Data, Marks, Panel, PanelCurve, Stack, Unit, one_after_another};
 use crate::theme::palette;
 
+/// Name of the plots of the page.
+pub(crate) const RESIDUAL_STACK: &str = "residual";
+
 /// Curves in time; logs stand one after another.
 pub(super) struct InTime {
     time_s: Vec<f64>,
@@ -29,7 +32,7 @@ impl InTime {
             explorer.measured.iter().zip(residual).map(|(measured, left)| measured - left).collect()
         };
         let limits = [time_s.first().copied().unwrap_or(0.0), time_s.last().copied().unwrap_or(1.0)];
-        let mut stack = Stack::new("residual", 1.0);
+        let mut stack = Stack::new(RESIDUAL_STACK, 1.0);
         stack.show_all(limits);
         if several {
             stack.x[0] = "time, log after log [s]";

@@ -13,6 +13,7 @@ use crate::command::Commands;
 use crate::theme::palette;
 use crate::widgets::{hint_ui, legend_ui, section_ui, shown};
 use in_time::InTime;
+pub(crate) use in_time::RESIDUAL_STACK;
 use over::{Over, orders_summary, orders_ui};
 
 /// The pictures need this much; a lower page scrolls.
@@ -24,6 +25,11 @@ pub(super) struct ResidualStep {
     /// Curves of an answer, with the answer's number.
     in_time: Option<(u64, InTime)>,
     over: Over,
+}
+
+/// Whether there are plots of what was found.
+pub(super) fn has_plots(refined: Option<&Answered<Box<Refinement>>>) -> bool {
+    refined.is_some_and(|found| !found.answer.explorer.before.is_empty())
 }
 
 /// How this step stands.
