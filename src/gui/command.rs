@@ -191,6 +191,8 @@ pub(crate) enum Command {
     Runs(RunsCommand),
     /// One sentence for the status line.
     Say(String),
+    /// The same of something that went wrong.
+    Complain(String),
 }
 
 /// The wishes of this pass.

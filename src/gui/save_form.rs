@@ -265,7 +265,11 @@ impl<K: FileKind> SaveForm<K> {
     fn progress_ui(&self, ui: &mut Ui) {
         let Some(writing) = self.writing.as_ref().filter(|writing| writing.share > 0.0) else { return };
         ui.horizontal(|ui| {
-            if ui.button("Cancel saving").on_hover_text("Stop writing; no file is left").clicked() {
+            if ui
+                .button("Cancel saving")
+                .on_hover_text("Stop writing; the file that is begun is not kept")
+                .clicked()
+            {
                 writing.job.cancel();
             }
             let text = format!("{}, {:.0} %", writing.path.display(), 100.0 * writing.share);

@@ -52,15 +52,15 @@ pub(crate) enum Saved {
     AnotherIsThere,
 }
 
-/// Writes a file; an existing one is replaced only if `replace`.
+/// Writes a file; an existing one is replaced only if `replace`. `text` is made only where it is written.
 ///
 /// # Errors
 /// A sentence that says what could not be written and the mend.
-pub(crate) fn save_file(path: &Path, text: &str, replace: bool) -> Result<Saved, String> {
+pub(crate) fn save_file(path: &Path, text: impl FnOnce() -> String, replace: bool) -> Result<Saved, String> {
     if !replace && path.symlink_metadata().is_ok() {
         return Ok(Saved::AnotherIsThere);
     }
-    write_file(path, text.as_bytes()).map(|()| Saved::Written).map_err(|error| not_saved(path, &error))
+    write_file(path, text().as_bytes()).map(|()| Saved::Written).map_err(|error| not_saved(path, &error))
 }
 
 /// Share of what is written, from 0 to 1.

@@ -159,6 +159,11 @@ impl App {
             Command::ShowDialog(purpose) => self.show_dialog(purpose),
             Command::LoadPreset(number) => self.ask_preset(number),
             Command::TakePreset(number) => self.load_preset(number),
+            // Who opens a log where a model is asked for means the log.
+            Command::LoadModel(path) if path.extension().is_some_and(|ending| ending == "csv") => {
+                self.commands.send(Command::LoadLog(path));
+                self.commands.send(Command::SelectTab(Tab::Friction));
+            }
             Command::LoadModel(path) => self.load_model(absolute(path)),
             Command::SaveModel(path) => self.save_model(absolute(path), false),
             Command::OverwriteModel(path) => self.save_model(absolute(path), true),
@@ -196,6 +201,7 @@ impl App {
                 }
             }
             Command::Say(text) => self.say(text),
+            Command::Complain(text) => self.fail(text),
         }
         ctx.request_repaint();
     }
@@ -443,9 +449,11 @@ impl App {
         let (file, model) = (path.clone(), self.session.model());
         let write = move |_: &Reporter<()>| {
             // Comments and order of the file that is replaced stay.
-            let text = std::fs::read_to_string(&file)
-                .map_or_else(|_| model.to_toml(), |existing| model.to_toml_over(&existing));
-            save_file(&file, &text, replace)
+            let text = || match std::fs::read_to_string(&file) {
+                Ok(existing) => model.to_toml_over(&existing),
+                Err(_) => model.to_toml(),
+            };
+            save_file(&file, text, replace)
         };
         match Job::start("save-model", &self.waker, write) {
             Ok(job) => self.model_job = Some(ModelJob::Save(path, self.session.clone(), job)),

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use egui::{Context, Theme, ViewportCommand};
+use egui::{Context, InputState, Key, Theme, ViewportCommand};
 use flqr_core::model_file::Model;
 
 use super::App;
@@ -42,9 +42,12 @@ pub(super) fn open_store(folder: Option<PathBuf>, waker: &Waker) -> std::io::Res
 }
 
 impl App {
-    /// Takes in what was edited: each drag, typed value, load or use of a fit is one step.
+    /// Takes in what was edited: each drag, held arrow key, typed value, load or use of a fit is one step.
     pub(super) fn watch_undo(&mut self, ctx: &Context) {
-        let settled = !ctx.input(|input| input.pointer.any_down());
+        let moves = [Key::ArrowLeft, Key::ArrowRight, Key::ArrowUp, Key::ArrowDown];
+        let is_moving =
+            |input: &InputState| input.pointer.any_down() || moves.into_iter().any(|key| input.key_down(key));
+        let settled = !ctx.input(is_moving);
         self.watch(settled);
     }
 
@@ -362,7 +365,7 @@ impl App {
         }
         let path = with_ending(path);
         let (file, document) = (path.clone(), self.document(ctx));
-        let write = move |_: &Reporter<()>| save_file(&file, &document.to_json(), replace);
+        let write = move |_: &Reporter<()>| save_file(&file, || document.to_json(), replace);
         match Job::start("save-session", &self.waker, write) {
             Ok(job) => self.session_job = Some(SessionJob::Save(path, job)),
             Err(error) => self.fail(format!("No thread to save the session: {error}.")),

@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use egui::text::{LayoutJob, TextFormat};
+use egui::text::{CCursor, CCursorRange, LayoutJob, TextFormat};
 use egui::{
-    Button, Color32, Context, Grid, Key, Modal, Modifiers, RichText, ScrollArea, Stroke, TextEdit, TextStyle,
-    Ui, vec2,
+    Button, Color32, Context, Grid, Id, Key, Modal, Modifiers, RichText, ScrollArea, Stroke, TextEdit,
+    TextStyle, Ui, vec2,
 };
 use flqr_core::model_file::{Change, Model, presets};
 
@@ -469,9 +469,18 @@ fn path_ui(
     if let Some(reason) = reason {
         warning_ui(ui, reason);
     }
-    let field = TextEdit::singleline(text).hint_text("path of the file").desired_width(f32::INFINITY);
+    let id = Id::unique("path of a dialog");
+    let begins = !std::mem::replace(has_focus, true);
+    if begins {
+        // What is typed takes the place of what is offered.
+        let mut state = TextEdit::load_state(ui.ctx(), id).unwrap_or_default();
+        let all = CCursorRange::two(CCursor::new(0), CCursor::new(text.chars().count()));
+        state.cursor.set_char_range(Some(all));
+        TextEdit::store_state(ui.ctx(), id, state);
+    }
+    let field = TextEdit::singleline(text).id(id).hint_text("path of the file").desired_width(f32::INFINITY);
     let field = ui.add(field).accessible_name("path of the file");
-    if !std::mem::replace(has_focus, true) {
+    if begins {
         field.request_focus();
     }
     let entered = field.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));

@@ -178,16 +178,17 @@ impl Export {
         self.form.problem = begun.err();
     }
 
-    /// A sentence when something was written; what could not be is said in the form.
-    pub(super) fn drain(&mut self) -> Option<String> {
-        self.form.drain()?.ok()
+    /// A sentence when something was written, or could not be.
+    pub(super) fn drain(&mut self) -> Option<Result<String, String>> {
+        self.form.drain()
     }
 }
 
 fn size_ui(ui: &mut Ui, size_px: &mut [f64; 2]) {
-    for (side, name) in size_px.iter_mut().zip(["figure width", "figure height"]) {
-        let field = DragValue::new(side).range(200.0..=10_000.0).speed(5.0).suffix(" px");
-        ui.add(field).accessible_name(name);
+    for (side, [name, times]) in size_px.iter_mut().zip([["figure width", "×"], ["figure height", "px"]]) {
+        let field = DragValue::new(side).range(200.0..=10_000.0).speed(5.0);
+        ui.add(field).accessible_name(name).on_hover_text(format!("The {name}, px"));
+        ui.label(times);
     }
 }
 
@@ -240,9 +241,9 @@ fn one_line(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use flqr_core::record::{ColumnMap, ReadOptions, read_log};
-
     use std::ops::ControlFlow;
+
+    use flqr_core::record::{ColumnMap, ReadOptions, read_log};
 
     use super::*;
 

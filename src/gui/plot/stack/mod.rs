@@ -70,8 +70,8 @@ impl Panel<'_> {
 pub struct Wishes {
     /// Ask for a path with a dialog.
     pub dialog: Option<FigureFile>,
-    /// Say this.
-    pub said: Option<String>,
+    /// Say this, or complain of it.
+    pub said: Option<Result<String, String>>,
     /// What the user did to marks.
     pub moved: Moved,
     /// How far a drag has moved a curve, where [`Stack::drag_moves_curve`] is set.
@@ -84,8 +84,10 @@ impl Wishes {
         if let Some(file) = self.dialog {
             commands.send(Command::ShowDialog(FilePurpose::SaveFigure(file)));
         }
-        if let Some(text) = self.said {
-            commands.send(Command::Say(text));
+        match self.said {
+            Some(Ok(text)) => commands.send(Command::Say(text)),
+            Some(Err(problem)) => commands.send(Command::Complain(problem)),
+            None => {}
         }
         self.moved
     }
