@@ -546,6 +546,17 @@ sin_1_n = 0.5
         }
     }
 
+    /// The last line of a file without a line feed is wrong, and not cut.
+    #[test]
+    fn a_wrong_last_line_is_not_told_as_a_cut() {
+        for (last, part) in
+            [("gravity_m_s2 = 9,81", "9,81"), ("name = \"a\"", "duplicate key"), ("q_diagonal = 1 2", "1 2")]
+        {
+            let error = Model::from_toml(&format!("name = \"a\"\n{last}"), "m.toml").unwrap_err();
+            assert!(error.problem.contains(part) && !error.problem.contains("ends"), "{error}");
+        }
+    }
+
     /// A cut within a word, within a list, behind a value and within a table.
     #[test]
     fn a_file_that_was_cut_off_is_told_as_one() {

@@ -5,7 +5,7 @@ use super::position_at;
 /// Of text that is no TOML, at a byte of it.
 pub(super) fn not_toml(message: &str, text: &str, byte: usize) -> String {
     let found = line_around(text, byte);
-    if !text.ends_with('\n') && rest_of_lines(text, byte).is_empty() {
+    if !text.ends_with('\n') && byte >= text.trim_end().len() {
         return format!(
             "the file ends in the middle of `{found}`: finish the line, or take the whole file if this one was cut off"
         );
