@@ -1,7 +1,7 @@
 //! What is wrong with data, in plain sentences with the mend.
 
 use egui::{ProgressBar, RichText, Ui};
-use flqr_core::record::{HealthFinding, LineProblem, Log, Severity};
+use flqr_core::record::{HealthFinding, Severity};
 
 use crate::load::{LoadedLog, Loader};
 use crate::theme::palette;
@@ -61,21 +61,15 @@ pub(crate) fn findings_ui<'a>(findings: impl IntoIterator<Item = &'a HealthFindi
     }
 }
 
-/// The first rows and cells of a log that could not be used, in one line.
-pub(crate) fn unread_cells(log: &Log) -> Option<String> {
-    let first: Vec<String> = log.problems.iter().take(SHOWN_PROBLEMS).map(LineProblem::to_string).collect();
-    let more = log.problem_count - first.len();
-    let more = if more > 0 { format!("; and {more} more") } else { String::new() };
-    (!first.is_empty()).then(|| first.join("; ") + &more)
-}
-
 /// The first rows and cells that could not be used, where they are in the file.
 fn line_problems_ui(loaded: &LoadedLog, ui: &mut Ui) {
     let log = &loaded.log;
     if log.problem_count == 0 {
         return;
     }
-    let count = format!("{} rows left out, {} problems in lines", log.dropped_rows, log.problem_count);
+    let many = |count: usize| if count == 1 { "" } else { "s" };
+    let (rows, problems) = (log.dropped_rows, log.problem_count);
+    let count = format!("{rows} row{} left out, {problems} problem{} in lines", many(rows), many(problems));
     warning_ui(ui, count);
     for problem in log.problems.iter().take(SHOWN_PROBLEMS) {
         ui.label(RichText::new(problem.to_string()).small().weak());

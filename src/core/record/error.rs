@@ -27,8 +27,8 @@ impl fmt::Display for LineProblem {
     }
 }
 
-/// Where problems are, by their columns and lines.
-pub(super) fn places(problems: &[LineProblem]) -> String {
+/// Where `count` problems are, by their columns and lines, of which these were kept.
+pub(super) fn places(problems: &[LineProblem], count: usize) -> String {
     const LINES: usize = 4;
     let mut columns: Vec<(&str, Vec<u64>)> = Vec::new();
     for problem in problems {
@@ -44,7 +44,8 @@ pub(super) fn places(problems: &[LineProblem]) -> String {
         let more = if lines.len() > LINES { ", …" } else { "" };
         format!("{what} at {word} {shown}{more}")
     });
-    told.collect::<Vec<_>>().join(", ")
+    let told = told.collect::<Vec<_>>().join(", ");
+    if count > problems.len() { format!("the first {} of them {told}", problems.len()) } else { told }
 }
 
 /// Why a log could not be read; `file` is the name that the user gave it.
@@ -161,7 +162,7 @@ pub enum LogError {
         bad: usize,
         /// Rows of the file.
         rows: usize,
-        /// The first problem, and where all of them are.
+        /// The first problem, and where those are that were kept.
         problems: String,
     },
     /// Time repeats or runs back too often to drop the rows.

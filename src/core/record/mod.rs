@@ -123,7 +123,11 @@ impl Log {
             1 => "1 cell or row".to_owned(),
             count => format!("{count} cells or rows"),
         };
-        Some(format!("{cells} of {} could not be read, {}", self.source, error::places(&self.problems)))
+        Some(format!(
+            "{cells} of {} could not be read, {}",
+            self.source,
+            error::places(&self.problems, self.problem_count)
+        ))
     }
 
     /// Number of rows.

@@ -69,7 +69,7 @@ impl Table {
             Some(first) if dropped_rows * 2 > rows => {
                 let problems = match problems.len() {
                     1 => first.to_string(),
-                    _ => format!("{first}; in all {}", places(&problems)),
+                    _ => format!("{first}; in all {}", places(&problems, problem_count)),
                 };
                 return Err(LogError::MostlyBad { file: file.to_owned(), bad: dropped_rows, rows, problems });
             }

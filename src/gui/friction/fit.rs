@@ -13,11 +13,9 @@ use super::fitted::Fitted;
 use super::motion_chart::MotionChart;
 use crate::command::Command;
 use crate::context::ViewContext;
-use crate::health_card::unread_cells;
 use crate::job::{Job, Outcome, Waker};
 use crate::load::LoadedLog;
 use crate::messages::{Said, Severity};
-use crate::quantity::MOTORS;
 use crate::runs::{Run, RunKind, Sources, Value};
 use crate::widgets::{choice_ui, error_ui, hint_ui, section_ui, shown};
 
@@ -86,7 +84,8 @@ impl Default for FitRun {
 struct MadeWith {
     log: Arc<Log>,
     model: Option<Model>,
-    motor: Motor,
+    /// Where there is a choice of one.
+    motor: Option<Motor>,
     options: FitOptions,
     command: Option<String>,
 }
@@ -97,13 +96,15 @@ impl MadeWith {
         let name = Path::new(&log.source)
             .file_name()
             .map_or(log.source.as_str().into(), |name| name.to_string_lossy());
-        let motor = MOTORS[*motor as usize];
+        let of = motor.map_or(String::new(), |motor| format!("{motor}, "));
         let method = if options.method == Method::Best { "best" } else { "pso" };
-        let mut row = Run::new(RunKind::Fit, format!("friction, {motor}, {name}"), model.as_ref(), sources)
+        let mut row = Run::new(RunKind::Fit, format!("friction, {of}{name}"), model.as_ref(), sources)
             .with("fit.log", Value::Text(log.source.clone()))
-            .with("fit.motor", Value::Text(motor.to_owned()))
             .with("fit.method", Value::Text(method.to_owned()))
             .with("fit.seed", Value::Number(options.seed as f64));
+        if let Some(motor) = motor {
+            row = row.with("fit.motor", Value::Text(motor.to_string()));
+        }
         let mut result = format!("error {} {}", shown(report.rmse, 3), report.rmse_unit);
         for (key, estimate) in &report.parameters {
             row = row.with(&format!("result.{key}"), Value::Number(estimate.value));
@@ -129,13 +130,10 @@ fn has_motors(kind: Option<LogKind>, rig: &Rig) -> bool {
     }
 }
 
-/// Why there is no fit, with the cells that the log lost where it lost any.
-fn refusal(error: &FitError, log: &Log) -> Said {
-    if matches!(error, FitError::Cancelled { .. }) {
-        return (Severity::Note, error.to_string());
-    }
-    let lost = unread_cells(log).map(|cells| format!(". Of the log, this was not read: {cells}"));
-    (Severity::Error, format!("{error}{}", lost.unwrap_or_default()))
+/// Why there is no fit.
+fn refusal(error: &FitError) -> Said {
+    let is_asked = matches!(error, FitError::Cancelled { .. });
+    (if is_asked { Severity::Note } else { Severity::Error }, error.to_string())
 }
 
 impl FitRun {
@@ -153,14 +151,16 @@ impl FitRun {
     ) -> Result<(), String> {
         self.discard();
         let log = Arc::clone(&loaded.log);
-        let model = fitting_model(loaded.kind.as_ref().ok().copied(), model).filter(|_| self.from_model);
+        let kind = loaded.kind.as_ref().ok().copied();
+        let has_motors = has_motors(kind, &model.rig);
+        let model = fitting_model(kind, model).filter(|_| self.from_model);
         self.held = model.is_some();
         let motor = self.motor;
         let options = self.options();
         let made_with = MadeWith {
             log: Arc::clone(&log),
             model: model.clone(),
-            motor,
+            motor: has_motors.then_some(motor),
             options: options.clone(),
             command,
         };
@@ -174,7 +174,7 @@ impl FitRun {
                 })
             };
             let report = fit(std::slice::from_ref(&*log), model.as_ref(), motor, &options, &mut watch)
-                .map_err(|error| refusal(&error, &log))?;
+                .map_err(|error| refusal(&error))?;
             Ok((report, Sources::new(model.as_ref(), [&*log])))
         };
         self.job = Some(Job::start("fit", waker, work).map_err(|e| format!("No thread for the fit: {e}."))?);
