@@ -56,7 +56,8 @@ impl Comparison {
             return failure.trim_end_matches('.').to_owned();
         }
         let found = run.statistics_between([run.statistics_from_s(), run.end_s()]).unwrap_or_default();
-        let signals = self.signals(true);
+        // Of the text, which files keep: one unit whatever the window shows.
+        let signals = self.signals(self.settings.scenario.on_ground());
         let spread = signals.iter().zip(found).map(|(signal, summary)| {
             let quantity = &signal.quantity;
             format!("{} std {} {}", quantity.name, shown(quantity.scale * summary.std, 3), quantity.unit)

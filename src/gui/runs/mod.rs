@@ -85,6 +85,7 @@ impl RunsTab {
         let row = self.ledger.row(number)?;
         let file = row.file()?;
         if self.reading.iter().any(|reading| reading.row.number == number) {
+            self.ticked.insert(number);
             return None;
         }
         match Reading::start(row, file, waker) {

@@ -200,9 +200,10 @@ impl Overlay {
         {
             self.align_at_event(drawn);
         }
-        let (unit, scale) = shown_unit(self.channel, ui);
+        let (_, scale) = shown_unit(self.channel, ui);
         let mut level = scale * self.level;
-        number_ui(ui, &mut level, "event level", 46.0).on_hover_text(format!("Level of the event, {unit}"));
+        number_ui(ui, &mut level, "event level", 46.0)
+            .on_hover_text(format!("Level of the event of {}", label(self.channel, ui)));
         if level != scale * self.level {
             self.level = level / scale;
         }
@@ -407,7 +408,10 @@ fn shown_unit((_, unit): Named, ui: &Ui) -> (&'static str, f64) {
 }
 
 fn label(channel: Named, ui: &Ui) -> String {
-    format!("{} [{}]", channel.0, shown_unit(channel, ui).0)
+    match (channel.0, shown_unit(channel, ui).0) {
+        (name, "") => name.to_owned(),
+        (name, unit) => format!("{name} [{unit}]"),
+    }
 }
 
 /// Names of all curves of the ticked rows, in their order.

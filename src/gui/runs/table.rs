@@ -33,6 +33,8 @@ pub(super) struct RunTable {
     filter: String,
     /// The first box is to take the keyboard.
     pub(super) focus_first: bool,
+    /// The first box that is drawn in this frame takes it.
+    focuses: bool,
     /// A note that is being typed.
     note: Option<(u64, String)>,
     /// Largest width that each column has had, so that they stay where they are when other rows come into view.
@@ -58,7 +60,11 @@ impl RunTable {
         let result = (ui.available_width() - others).clamp(RESULT_WIDTH[0], RESULT_WIDTH[1]);
         self.widths[RESULT] = result;
         // The heads are the first row. Only what is in view is drawn.
-        let rows = ScrollArea::both().id_salt("runs").auto_shrink(false);
+        let mut rows = ScrollArea::both().id_salt("runs").auto_shrink(false);
+        if std::mem::take(&mut self.focus_first) {
+            rows = rows.vertical_scroll_offset(0.0);
+            self.focuses = true;
+        }
         rows.show_rows(ui, ROW_HEIGHT - ui.spacing().item_spacing.y, found.len() + 1, |ui, range| {
             let grid = Grid::new("run rows").num_columns(COLUMNS.len()).striped(true);
             let grid = grid.spacing([SPACING, 0.0]).min_row_height(ROW_HEIGHT).start_row(range.start);
@@ -140,7 +146,7 @@ impl RunTable {
         let result = self.widths[RESULT];
         let hash = run.sources.get(..8).unwrap_or(&run.sources);
         let tick = self.cell_ui(0, ui, |ui| tick_ui(context, run, ticked, ui));
-        if tick.enabled() && std::mem::take(&mut self.focus_first) {
+        if tick.enabled() && std::mem::take(&mut self.focuses) {
             tick.request_focus();
         }
         self.cell_ui(1, ui, |ui| number_ui(context, run.number, ui));
