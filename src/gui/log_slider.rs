@@ -57,7 +57,9 @@ fn steps(ui: &Ui, response: &Response) -> f64 {
     if response.has_focus() {
         let filter = EventFilter { horizontal_arrows: true, ..EventFilter::default() };
         ui.memory_mut(|memory| memory.set_focus_lock_filter(response.id, filter));
-        let presses = |key| ui.input(|input| input.num_presses(key)) as f64;
+        // With another modifier the arrows mean something else.
+        let is_ours = ui.input(|input| !input.modifiers.command && !input.modifiers.alt);
+        let presses = |key| if is_ours { ui.input(|input| input.num_presses(key)) as f64 } else { 0.0 };
         points += presses(Key::ArrowRight) - presses(Key::ArrowLeft);
     }
     let asked = |action| ui.input(|input| input.num_accesskit_action_requests(response.id, action)) as f64;
@@ -78,8 +80,8 @@ fn moved(value: f64, by: f64, range: &RangeInclusive<f64>) -> f64 {
     }
 }
 
-/// To five digits: less than a tenth of the smallest step is lost.
-fn rounded(value: f64) -> f64 {
+/// To five digits, as a person would type it: less than a tenth of the smallest step is lost.
+pub(crate) fn rounded(value: f64) -> f64 {
     format!("{value:.4e}").parse().unwrap_or(value)
 }
 

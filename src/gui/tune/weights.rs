@@ -8,7 +8,7 @@ use flqr_core::lqr::Weights;
 use super::matrices::matrices_ui;
 use crate::command::Command;
 use crate::context::ViewContext;
-use crate::log_slider::{HELP, log_slider_ui};
+use crate::log_slider::{HELP, log_slider_ui, rounded};
 use crate::plot::{Unit, UnitChoice};
 use crate::quantity::STATES;
 use crate::widgets::{choice_ui, hint_ui, number_ui, section_ui};
@@ -154,7 +154,7 @@ impl WeightEditor {
         let button = ui.add(button).accessible_name(format!("{word} {} weight", row.name));
         if button.on_hover_text(format!("{:.0} % {word} weight on {}", 100.0 * self.step, row.name)).clicked()
         {
-            *weight *= factor;
+            *weight = rounded(*weight * factor);
         }
     }
 }
