@@ -73,16 +73,24 @@ fn motor_ui(motor: Motor, status: &MotorStatus, ui: &mut Ui) {
     row_ui(ui, "temperature", &with_unit(status.temperature_c, 0, "°C"), None);
     let voltage = status.health.map(|health| health.voltage_v);
     row_ui(ui, "supply", &with_unit(voltage, 1, "V"), None);
-    row_ui(ui, "torque current", &with_unit(status.current_a, 2, "A"), None);
+    // Of a motor that is no longer asked nobody knows what it does now.
+    let is_old = status.age.is_some_and(|age| age > OLD);
+    let current_a = status.current_a.filter(|_| !is_old);
+    row_ui(ui, "torque current", &with_unit(current_a, 2, "A"), None);
     let Some(health) = status.health else {
         row_ui(ui, "errors", "not read", None);
         return;
     };
     if let Some(on) = health.on {
-        row_ui(ui, "power", if on { "on" } else { "off" }, None);
+        let power = match on {
+            _ if is_old => "–",
+            true => "on",
+            false => "off",
+        };
+        row_ui(ui, "power", power, None).on_hover_text("As the motor said last; nothing once that is old");
     }
     if health.errors.is_none() {
-        row_ui(ui, "errors", "none", Some(colors.good));
+        row_ui(ui, "errors", "none", (!is_old).then_some(colors.good));
     } else {
         let text = RichText::new(health.errors.to_string()).strong().color(colors.error);
         ui.add(Label::new(text).truncate()).on_hover_text(health.errors.to_string());
