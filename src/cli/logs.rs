@@ -66,7 +66,7 @@ pub(crate) struct Estimated {
     /// Motor of a robot model that a bench log belongs to
     #[arg(long, value_enum, default_value = "left")]
     pub(crate) motor: MotorName,
-    /// Numbers of the model that the log alone tells: `all`, or names as in the model file
+    /// Numbers that the logs alone tell, whatever the model says of them: `all`, or names as in the model file
     #[arg(long, value_delimiter = ',', value_name = "NAME,...")]
     pub(crate) estimate: Vec<String>,
     #[command(flatten)]

@@ -49,7 +49,7 @@ impl Quantity {
         Self { name, unit, scale: 1.0, min_span }
     }
 
-    /// A speed of a shaft that no log of a robot has.
+    /// Speed of a motor's shaft.
     pub(crate) const fn shaft_speed(name: &'static str, degrees: bool) -> Self {
         if degrees { Self::in_degrees(name, "°/s", 6.0) } else { Self::plain(name, "rad/s", 0.1) }
     }

@@ -83,7 +83,7 @@ fn row_ui(index: usize, tried: &Tried, ui: &mut Ui) {
         let (rect, _) = ui.allocate_exact_size(vec2(BAR, 10.0), Sense::hover());
         let share = if share.is_finite() { share } else { 0.0 };
         let bar = egui::Rect::from_min_size(rect.min, vec2(share * rect.width(), rect.height()));
-        ui.painter().rect_filled(rect, 2.0, ui.visuals().faint_bg_color);
+        ui.painter().rect_filled(rect, 2.0, ui.visuals().extreme_bg_color);
         ui.painter().rect_filled(bar, 2.0, if added { colors.accent } else { colors.reference });
         ui.label(mono(format!("{} %", shown(tried.gain_percent, 3))));
     });

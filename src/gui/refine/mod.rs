@@ -154,6 +154,8 @@ impl RefineTab {
         let mut done = Done::default();
         match command {
             RefineCommand::Load { path, held_out } => {
+                // A path that means the same wherever the session is opened.
+                let path = std::path::absolute(&path).unwrap_or(path);
                 self.sources.load(&path, held_out, around.waker)?;
                 done.log = Some(path);
             }

@@ -446,7 +446,7 @@ impl Problem {
             self.warnings.push(if told_from_zero {
                 format!(
                     "{key} = {value:.3e} is negative, as on no real axis: check the signs of position and effort, \
-                     and that the model has all loads on the axis"
+                     that the model has all loads on the axis, or let a model hold what is known of it"
                 )
             } else {
                 format!("{key} = {value:.3e} is not told from 0: record a motion in which it matters more")

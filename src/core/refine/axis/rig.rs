@@ -14,6 +14,7 @@ use super::trace::{Acting, Names, Part, Rows, Trace};
 
 /// Largest share of the acceleration's power that is taken for noise.
 const MOST_NOISE: f64 = 0.5;
+
 /// The declared axis.
 #[derive(Clone, Debug)]
 pub(super) struct Declared {
