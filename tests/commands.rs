@@ -493,9 +493,7 @@ fn gains_follow_the_legs() {
     assert!(refusal(&["gains", &legged, "--schedule", "1"], 1).contains("from 2 to 1000 heights"));
     let late = json(&["gains", &slow]);
     assert_eq!(late["margins"]["stable"], false);
-    assert!(
-        String::from_utf8(flqr(&["gains", &slow]).stderr).unwrap().starts_with("flqr: warning: the loop")
-    );
+    assert!(String::from_utf8(flqr(&["gains", &slow]).stderr).unwrap().contains("flqr: warning: the loop"));
     assert!(late["warnings"][0].as_str().unwrap().contains("delay 300 ms"), "{late}");
 }
 
@@ -528,6 +526,38 @@ fn wrong_models_are_refused_with_file_and_line() {
     assert!(refusal(&["simulate", PAPER, "--leg-height", "0.9"], 1).contains("leg_height_m = 0.9"));
     let short = ["simulate", PAPER, "--scenario", "friction-sweep", "--controller", "pi", "--seconds", "5"];
     assert!(refusal(&short, 1).contains("give at least"));
+}
+
+#[test]
+fn a_unit_slip_in_a_model_is_a_warning_of_every_command_and_a_key_of_its_result() {
+    let model = paper_with("slip.toml", &[("wheel_radius_m = 0.055", "wheel_radius_m = 55.0")]);
+    let warning = "robot.wheel_radius_m: 55 looks like millimetres";
+    for command in [
+        &["gains", &model][..],
+        &["export", &model, "--to", "json"],
+        &["simulate", &model, "--seconds", "0.01"],
+    ] {
+        let message = String::from_utf8(flqr(command).stderr).unwrap();
+        assert!(message.contains(&format!("slip.toml: {warning}")), "{command:?}: {message}");
+    }
+    for command in [&["gains", &model][..], &["simulate", &model, "--seconds", "0.01"]] {
+        let result = json(command);
+        let warnings = result["warnings"].as_array().unwrap();
+        assert!(
+            warnings.iter().any(|text| text.as_str().is_some_and(|text| text.starts_with(warning))),
+            "{command:?}: {warnings:?}"
+        );
+    }
+}
+
+#[test]
+fn a_safety_limit_that_switches_its_check_off_is_refused_before_a_robot_is_driven() {
+    let degrees = paper_with("degrees.toml", &[("[limits]", "[safety]\ntilt_rad = 30\n[limits]")]);
+    let message = refusal(&["drive", "emulated", &degrees], 1);
+    assert!(message.contains("30 looks like degrees: 30° is 0.524 rad"), "{message}");
+    let lazy = paper_with("unstable.toml", &[("delay_s = 0.004", "delay_s = 0.06")]);
+    let message = refusal(&["drive", "emulated", &lazy], 1);
+    assert!(message.contains("the loop is unstable with its sampling and 60.0 ms of delay"), "{message}");
 }
 
 #[test]
@@ -568,9 +598,9 @@ fn without_a_display_a_sentence_names_the_commands() {
 /// Robot log in, MCAP file out; same input, same bytes.
 #[test]
 fn a_log_becomes_an_mcap_file() {
-    let log = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("convert.csv").display().to_string();
+    let log = file("convert.csv", "");
     json(&["simulate", PAPER, "--seconds", "1", "--log", &log]);
-    let out = log.replace(".csv", ".mcap");
+    let out = file("convert.mcap", "");
     let done = json(&["convert", &log, &out]);
     assert_eq!(done["topics"]["/state"], 1000, "{done}");
     assert_eq!((&done["topics"]["/motors/left"], &done["dropped"]), (&1000.into(), &0.into()));

@@ -5,7 +5,7 @@
 use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Command, Output, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
 
@@ -26,16 +26,20 @@ fn recording(name: &str) -> PathBuf {
 fn patient_model(csv: &Path) -> PathBuf {
     let model = csv.with_extension("toml");
     let paper = fs::read_to_string("presets/paper.toml").unwrap();
-    let patience = "[safety]\nlate_s = 1.0\nmotor_timeout_s = 1.0\nimu_timeout_s = 1.0\nimu_frozen_s = 1.0\n";
+    let patience = "[safety]\nlate_s = 1.0\nmotor_timeout_s = 1.0\nimu_timeout_s = 1.0\nimu_frozen_s = 1.0\nround_trip_s = 1.0\n";
     fs::write(&model, format!("{paper}\n{patience}")).unwrap();
     model
 }
 
 fn drive(csv: &Path, more: &[&str], out: Stdio) -> Child {
+    start(csv, &[&["--arm", "--yes"], more].concat(), out)
+}
+
+fn start(csv: &Path, more: &[&str], out: Stdio) -> Child {
     Command::new(env!("CARGO_BIN_EXE_flqr"))
         .args(["drive", "emulated"])
         .arg(patient_model(csv))
-        .args(["--arm", "--yes", "--json", "--record"])
+        .args(["--json", "--record"])
         .arg(csv)
         .args(more)
         .stdin(Stdio::null())
@@ -52,6 +56,115 @@ fn wait_for(frame: &str, csv: &Path) {
     }
 }
 
+fn signal(program: &Child, name: &str) {
+    let sent = Command::new("kill").args([&format!("-{name}"), &program.id().to_string()]).status().unwrap();
+    assert!(sent.success());
+}
+
+fn lines(output: &Output) -> Vec<Value> {
+    let text = String::from_utf8(output.stdout.clone()).unwrap();
+    text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect()
+}
+
+/// The object that every run ends with.
+fn end(output: &Output) -> Value {
+    let ends: Vec<Value> = lines(output).into_iter().filter(|line| line["type"] == "end").collect();
+    let [end] = &ends[..] else { panic!("{ends:?}") };
+    end.clone()
+}
+
+/// Command bytes of the frames that were sent, in turn.
+fn sent(csv: &Path) -> Vec<String> {
+    let frames = fs::read_to_string(csv.with_extension("log")).unwrap();
+    let sent = frames.lines().filter(|frame| frame.ends_with(" T"));
+    sent.map(|frame| frame.split_once('#').unwrap().1[..2].to_owned()).collect()
+}
+
+#[test]
+fn without_arm_nothing_is_sent_but_queries() {
+    let csv = recording("drive-checked.csv");
+    let output = start(&csv, &[], Stdio::piped()).wait_with_output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let end = end(&output);
+    assert!(end["problem"].is_null() && end["motors_off"] == true, "{end}");
+    let sent = sent(&csv);
+    assert!(
+        sent.len() > 100 && sent.iter().all(|command| ["9A", "9C"].contains(&command.as_str())),
+        "{sent:?}"
+    );
+}
+
+#[test]
+fn every_signal_stops_the_robot_before_it_ends_or_suspends_the_program() {
+    let usual = ["INT", "TERM"];
+    let others = ["HUP", "QUIT", "USR1", "USR2", "XFSZ", "TSTP"];
+    std::thread::scope(|scope| {
+        for name in usual.into_iter().chain(others) {
+            scope.spawn(move || {
+                let csv = recording(&format!("drive-{name}.csv"));
+                let program = drive(&csv, &[], Stdio::piped());
+                wait_for(" 141#A1", &csv);
+                signal(&program, name);
+                if name == "TSTP" {
+                    let state = format!("/proc/{}/stat", program.id());
+                    while !fs::read_to_string(&state).unwrap().contains(") T ") {
+                        sleep(Duration::from_millis(10));
+                    }
+                    assert_eq!(sent(&csv).last().unwrap(), "80", "the motors are off while it is suspended");
+                    signal(&program, "CONT");
+                }
+                let output = program.wait_with_output().unwrap();
+                let end = end(&output);
+                assert_eq!(
+                    (&end["stopped_by"], &end["signal"], &end["motors_off"]),
+                    (&"asked".into(), &format!("SIG{name}").into(), &true.into())
+                );
+                assert_eq!(output.status.code(), Some(i32::from(!usual.contains(&name))), "{end}");
+                assert_eq!(end["problem"].is_null(), usual.contains(&name), "{end}");
+                let sent = sent(&csv);
+                let torques_nm = fs::read_to_string(csv.with_extension("csv")).unwrap();
+                assert!(torques_nm.contains("stop: stopped"), "the stop is in the recording");
+                assert_eq!(&sent[sent.len() - 2..], ["80", "80"], "{name}");
+                assert!(
+                    sent.iter().rev().nth(2).is_some_and(|command| command == "A1"),
+                    "torque zero before"
+                );
+            });
+        }
+    });
+}
+
+#[test]
+fn a_run_that_fails_has_its_end_line_too() {
+    let csv = recording("drive-unarmed.csv");
+    let output = start(&csv, &["--arm"], Stdio::piped()).wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    let end = end(&output);
+    assert!(end["problem"].as_str().unwrap().contains("there is no terminal to ask on"), "{end}");
+    assert!(end["recording"]["rows"].as_u64().unwrap() > 0 && end["motors_off"] == true, "{end}");
+}
+
+#[test]
+fn a_recording_that_ends_early_is_a_problem_of_the_run() {
+    let csv = recording("drive-cut.csv");
+    let model = patient_model(&csv);
+    // Files may grow to 64 blocks of 512 or 1024 bytes, then the system sends SIGXFSZ.
+    let script =
+        "ulimit -f 64; exec \"$0\" drive emulated \"$1\" --arm --yes --json --record \"$2\" --seconds 60";
+    let output = Command::new("sh")
+        .args(["-c", script, env!("CARGO_BIN_EXE_flqr")])
+        .args([&model, &csv])
+        .stdin(Stdio::null())
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    let end = end(&output);
+    let problem = end["problem"].as_str().unwrap();
+    assert!(problem.contains("the recording has ended") && problem.contains("rows were lost"), "{end}");
+    assert!(end["recording"]["rows_lost"].as_u64().unwrap() > 0 && end["motors_off"] == true, "{end}");
+    assert_eq!(String::from_utf8(output.stderr).unwrap(), format!("flqr: {problem}\n"));
+}
+
 #[test]
 fn a_reader_that_takes_no_line_does_not_keep_the_robot_from_being_stopped() {
     let (_reader, mut writer) = io::pipe().unwrap();
@@ -59,8 +172,7 @@ fn a_reader_that_takes_no_line_does_not_keep_the_robot_from_being_stopped() {
     let csv = recording("drive-stalled.csv");
     let program = drive(&csv, &[], writer.into());
     wait_for(" 141#A1", &csv);
-    let stop = Command::new("kill").args(["-INT", &program.id().to_string()]).status().unwrap();
-    assert!(stop.success());
+    signal(&program, "INT");
     let output = program.wait_with_output().unwrap();
     let message = String::from_utf8(output.stderr).unwrap();
     assert!(!output.status.success() && message.contains("lines were not printed"), "{message}");
@@ -75,10 +187,9 @@ fn a_reader_that_takes_no_line_does_not_keep_the_robot_from_being_stopped() {
 fn a_reader_that_lives_gets_every_line_in_order_down_to_the_end() {
     let csv = recording("drive-read.csv");
     let output = drive(&csv, &["--seconds", "1"], Stdio::piped()).wait_with_output().unwrap();
-    let message = String::from_utf8(output.stderr).unwrap();
+    let message = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success() && message.is_empty(), "{message}");
-    let text = String::from_utf8(output.stdout).unwrap();
-    let lines: Vec<Value> = text.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let lines = lines(&output);
     let times: Vec<f64> = lines
         .iter()
         .filter(|line| line["type"] == "status")

@@ -165,7 +165,8 @@ fn an_imu_is_set_up_once_that_is_agreed_to() {
             .output()
             .unwrap();
         let message = String::from_utf8(program.stderr).unwrap();
-        serde_json::from_slice::<Value>(&program.stdout).map_err(|_| message)
+        let answer = serde_json::from_slice::<Value>(&program.stdout).unwrap();
+        if answer.get("error").is_some() { Err(message) } else { Ok(answer) }
     };
     let refused = set_up(&["--rate", "50"]).unwrap_err();
     assert!(
@@ -179,6 +180,24 @@ fn an_imu_is_set_up_once_that_is_agreed_to() {
     assert!((90.0..110.0).contains(&rate_hz("before")), "the refused one wrote nothing: {set}");
     assert!((45.0..55.0).contains(&rate_hz("after")), "{set}");
     assert_eq!(set["after"]["packets"], serde_json::json!(["acceleration", "rate", "angle"]));
+    emulator.end();
+}
+
+/// Its motors say nothing, for nobody asks them, but its IMU does.
+#[test]
+fn a_monitor_is_connected_only_where_the_source_that_was_named_is_heard() {
+    let emulator = Emulator::start(&[]);
+    let port = |name: &str| emulator.ports[name].as_str().unwrap().to_owned();
+    let output = Command::new(env!("CARGO_BIN_EXE_flqr"))
+        .args(["monitor", &format!("slcan:{}", port("slcan"))])
+        .args(["--imu", &format!("serial:{}@115200", port("imu")), "--seconds", "2", "--json"])
+        .output()
+        .unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    let lines: Vec<Value> = text.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let status: Vec<&Value> = lines.iter().filter(|line| line["type"] == "status").collect();
+    assert!(status.last().unwrap()["imu"]["packets"].as_u64().unwrap() > 100, "{text}");
+    assert!(status.iter().all(|line| line["connection"] == "silent" && line["hint"].is_string()), "{text}");
     emulator.end();
 }
 

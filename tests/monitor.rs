@@ -86,6 +86,56 @@ fn recordings_and_speeds_that_do_not_serve_are_refused_in_a_sentence() {
     }
 }
 
+#[cfg(unix)]
+#[test]
+fn a_reader_that_takes_no_line_does_not_keep_the_monitor_from_ending() {
+    use std::io::Write;
+    use std::process::Stdio;
+    const PIPE_BYTES: usize = 65_536;
+    let (_reader, mut writer) = std::io::pipe().unwrap();
+    writer.write_all(&[b'\n'; PIPE_BYTES]).unwrap();
+    for ending in ["csv", "log"] {
+        let _absent = std::fs::remove_file(path("monitor-stalled").with_extension(ending));
+    }
+    let csv = path("monitor-stalled.csv");
+    let program = Command::new(env!("CARGO_BIN_EXE_flqr"))
+        .args(["monitor", "emulated", "--json", "--record"])
+        .arg(&csv)
+        .stdout(writer)
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    while !std::fs::metadata(&csv).is_ok_and(|about| about.len() > 1000) {
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    let interrupted = Command::new("kill").args(["-INT", &program.id().to_string()]).status().unwrap();
+    assert!(interrupted.success());
+    let output = program.wait_with_output().unwrap();
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(!output.status.success() && message.contains("lines were not printed"), "{message}");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_recording_that_ends_early_is_a_problem_of_the_run() {
+    for ending in ["csv", "log"] {
+        let _absent = std::fs::remove_file(path("monitor-cut").with_extension(ending));
+    }
+    // Files may grow to 64 blocks of 512 or 1024 bytes.
+    let script = "ulimit -f 64; exec \"$0\" monitor emulated --json --record \"$1\" --seconds 2";
+    let output = Command::new("sh")
+        .args(["-c", script, env!("CARGO_BIN_EXE_flqr")])
+        .arg(path("monitor-cut.csv"))
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    let text = String::from_utf8(output.stdout).unwrap();
+    let lines: Vec<Value> = text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect();
+    let [end] = of_type(&lines, "end")[..] else { panic!("{text}") };
+    assert!(end["problem"].as_str().unwrap().contains("rows were lost"), "{end}");
+    assert!(end["recording"]["rows_lost"].as_u64().unwrap() > 0, "{end}");
+}
+
 const DBC: &str = "VERSION \"\"\n\nNS_ :\n\nBS_:\n\nBU_: ECU\n\nBO_ 256 Body: 8 ECU\n \
                    SG_ Lean : 0|16@1- (0.01,0) [0|0] \"deg\" ECU\n \
                    SG_ Left : 16|16@1- (0.1,0) [0|0] \"rpm\" ECU\n \

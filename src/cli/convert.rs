@@ -11,10 +11,11 @@ use flqr_core::record::ColumnMap;
 use flqr_core::record::mcap::{self, Conversion, ConvertError, Input};
 use serde::Serialize;
 
+use super::input;
 use super::logs::Columns;
 use super::output::{Failure, Output};
+use super::output_file::{self, Force, OutputFile};
 use super::progress::Progress;
-use super::{file, input};
 
 #[derive(Args)]
 pub(crate) struct Arguments {
@@ -24,6 +25,8 @@ pub(crate) struct Arguments {
     files: Vec<PathBuf>,
     #[command(flatten)]
     columns: Columns,
+    #[command(flatten)]
+    force: Force,
 }
 
 /// Keys of the JSON object.
@@ -37,7 +40,9 @@ struct Converted<'a> {
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let (out, files) = arguments.files.split_last().expect("clap asks for two files at least");
     check_output(out)?;
+    let out = OutputFile::new(out, "MCAP file");
     let files = with_frames(files);
+    output_file::check(&files.iter().map(PathBuf::as_path).collect::<Vec<_>>(), &[out], arguments.force)?;
     let map = arguments.columns.checked()?;
     let names: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
     let mut bytes = 0;
@@ -48,7 +53,8 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         inputs.push(Input { source, topic: topic(path), reader });
     }
     let conversion = write(out, inputs, &map, bytes)?;
-    output.result(&Converted { out, conversion: &conversion }, |text| print(text, out, &conversion))
+    let keys = Converted { out: out.path, conversion: &conversion };
+    output.answer(&keys, |text| print(text, out.path, &conversion))
 }
 
 /// Refuses what is no MCAP file by its name, most of all the last file of a recording without an output.
@@ -56,7 +62,7 @@ fn check_output(out: &Path) -> Result<(), Failure> {
     if out.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("mcap")) {
         return Ok(());
     }
-    Err(Failure::Message(format!(
+    Err(Failure::Output(format!(
         "{}: the last file is the one that is written, and only MCAP is: end its name in .mcap",
         out.display()
     )))
@@ -84,14 +90,14 @@ fn topic(path: &Path) -> &'static str {
 }
 
 fn write(
-    out: &Path,
+    out: OutputFile,
     inputs: Vec<Input<BufReader<File>>>,
     map: &ColumnMap,
     bytes: u64,
 ) -> Result<Conversion, Failure> {
-    let bar = Progress::new(format!("writing {}", out.display()));
+    let bar = Progress::new(format!("writing {}", out.path.display()));
     let mut done = None;
-    let written = file::write(out, "MCAP file", |sink| {
+    let written = out.write(|sink| {
         let converted = mcap::convert(inputs, map, sink, &mut |read| {
             bar.set(read, bytes);
             ControlFlow::Continue(())
@@ -100,7 +106,7 @@ fn write(
             Ok(conversion) => done = Some(Ok(conversion)),
             Err(ConvertError::Write(error)) => return Err(error),
             Err(error) => {
-                done = Some(Err(Failure::from_error(&error)));
+                done = Some(Err(Failure::from_input(&error)));
                 return Err(io::Error::other(error));
             }
         }
@@ -120,6 +126,8 @@ fn print(text: &mut dyn Write, out: &Path, conversion: &Conversion) -> io::Resul
     }
     if conversion.dropped > 0 {
         writeln!(text, "{} damaged rows and frames were left out:", conversion.dropped)?;
+    } else if !conversion.problems.is_empty() {
+        writeln!(text, "problems:")?;
     }
     conversion.problems.iter().try_for_each(|problem| writeln!(text, "  {problem}"))
 }

@@ -20,6 +20,7 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
+    arguments.kept.check(&[])?;
     let bar = Progress::new("demo");
     let shown = demonstrate(arguments.seed, &mut |share| {
         bar.set_share(share);
@@ -27,8 +28,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     })
     .map_err(Failure::from_error)?;
     drop(bar);
-    arguments.kept.write(&shown.found)?;
-    output.result(&shown, |out| print(out, &shown))
+    arguments.kept.write(&shown.found, || output.answer(&shown, |out| print(out, &shown)))
 }
 
 fn print(out: &mut dyn Write, shown: &Demonstration) -> io::Result<()> {

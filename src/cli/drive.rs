@@ -3,18 +3,21 @@
 use std::io::{self, IsTerminal};
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use flqr_core::control::ControllerKind;
 use flqr_core::control::drive::{CheckResult, DriveOrder, Excitation, Stage, StopReason};
-use flqr_core::device::{DriveStatus, Session, SessionMode, SessionOptions, SessionOrder, Source, Status};
+use flqr_core::device::{
+    DriveStatus, Ending, Session, SessionMode, SessionOptions, SessionOrder, Source, Status, stop_all,
+};
 
-use super::interrupt::Interrupt;
+use super::interrupt::{Duty, Interrupt};
 use super::monitor::Wire;
 use super::output::{Failure, Output, complain};
-use super::robot_lines::{End, Lines, died};
+use super::robot_lines::{End, Lines, Outcome, died};
 use super::{controller, input};
 
 /// How long the checks may take to pass, and arming from then on.
@@ -24,7 +27,7 @@ const MOTORS_OFF_LAST: Duration = Duration::from_secs(2);
 /// Time between two orders to arm, longer than the answer to one takes to be heard.
 const ARM_AGAIN: Duration = Duration::from_secs(1);
 
-/// Without --arm nothing is sent but queries: the checks are made and told. With --arm the robot is driven once they
+/// Without --arm nothing is sent but queries: the checks are made and their results are printed. With --arm the robot is driven once they
 /// have passed, after a question on the terminal or with --yes. Ctrl+C, or Enter, stops it.
 #[derive(Args)]
 pub(crate) struct Arguments {
@@ -104,33 +107,41 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         seed: arguments.seed,
         replay_speed: 1.0,
     };
-    let interrupt = Interrupt::watch()?;
+    let interrupt = Interrupt::watch(Duty::Drive)?;
     let mut session = Session::open(options, Arc::new(|| {})).map_err(Failure::from_error)?;
     session.send(SessionOrder::Drive(DriveOrder::Check));
+    let enter_stops = Arc::new(AtomicBool::new(false));
     let mut dialogue = Dialogue {
         arguments,
         interrupt: &interrupt,
-        lines: Lines::apart(output)?,
-        entered: entered_lines(),
+        lines: Lines::start(output)?,
+        entered: entered_lines(Arc::clone(&enter_stops)),
+        enter_stops,
         arming: Arming::default(),
         driven_since: None,
         stopped_since: None,
         stopping: false,
     };
-    let done = dialogue.hold(&mut session);
+    let mut last = None;
+    let held = dialogue.hold(&mut session, &mut last);
     // The motors are off before anybody is waited for.
-    drop(session);
-    done.and(dialogue.lines.finish(&interrupt))
+    let ending = session.close();
+    let done = dialogue.conclude(last.map_or(Duration::ZERO, |status| status.time), held, ending);
+    interrupt.wait_for_suspension();
+    done
 }
 
-/// Lines that the user enters, where somebody can.
-fn entered_lines() -> Option<Receiver<String>> {
+/// Lines that the user enters, where somebody can; each stops the robot at once while `stops` is set.
+fn entered_lines(stops: Arc<AtomicBool>) -> Option<Receiver<String>> {
     if !io::stdin().is_terminal() {
         return None;
     }
     let (sender, lines) = channel();
     let read = move || {
         for line in io::stdin().lines().map_while(Result::ok) {
+            if stops.load(Ordering::Acquire) {
+                stop_all();
+            }
             if sender.send(line).is_err() {
                 return;
             }
@@ -141,13 +152,15 @@ fn entered_lines() -> Option<Receiver<String>> {
     Some(lines)
 }
 
-/// The course of events, from the checks to the end. This thread sends the stop: it prints nothing while the robot is
-/// driven, so that no reader of the output keeps it waiting.
+/// The course of events, from the checks to the end. Signals and Enter stop the robot without this thread, whatever it
+/// does just then.
 struct Dialogue<'a> {
     arguments: &'a Arguments,
     interrupt: &'a Interrupt,
     lines: Lines<'a>,
     entered: Option<Receiver<String>>,
+    /// Whether what is entered stops the robot, and is no answer.
+    enter_stops: Arc<AtomicBool>,
     arming: Arming,
     driven_since: Option<Duration>,
     stopped_since: Option<Duration>,
@@ -155,21 +168,20 @@ struct Dialogue<'a> {
 }
 
 impl Dialogue<'_> {
-    fn hold(&mut self, session: &mut Session) -> Result<(), Failure> {
-        let mut last: Option<Status> = None;
+    fn hold(&mut self, session: &mut Session, last: &mut Option<Status>) -> Result<End, Failure> {
         loop {
             // Asked before, so that the last updates of a thread that has ended are read.
             let is_over = session.has_died();
             match session.wait(Duration::from_millis(100)) {
                 Some(update) => {
                     self.lines.update(&update)?;
-                    last = Some(update.status);
+                    *last = Some(update.status);
                 }
-                None if is_over => return Err(died()),
+                None if is_over => return Err(Failure::Message(died())),
                 None => {}
             }
             if let Some(end) = self.go_on(last.as_ref(), session)? {
-                return self.ended(last.map_or(Duration::ZERO, |status| status.time), &end);
+                return Ok(end);
             }
         }
     }
@@ -179,14 +191,13 @@ impl Dialogue<'_> {
         let drive = status.and_then(|status| status.drive.as_ref());
         let now = status.map_or(Duration::ZERO, |status| status.time);
         match drive.map_or(Stage::Listening, |drive| drive.stage) {
+            Stage::Stopped(_) if self.interrupt.came() && self.driven_since.is_none() => {
+                return Ok(Some(End::Interrupt));
+            }
             Stage::Stopped(reason) => {
                 let since = *self.stopped_since.get_or_insert(now);
                 let motors_off = drive.is_some_and(|drive| drive.motors_off);
-                if motors_off {
-                    return Ok(Some(End::Stopped(reason)));
-                }
-                if now.saturating_sub(since) > MOTORS_OFF_LAST {
-                    complain("the motors have not said that they are off: switch their supply off");
+                if motors_off || now.saturating_sub(since) > MOTORS_OFF_LAST {
                     return Ok(Some(End::Stopped(reason)));
                 }
             }
@@ -202,7 +213,7 @@ impl Dialogue<'_> {
                     }));
                 }
             }
-            // Should an order to arm be on its way, it is undone: dropping the session switches the motors off.
+            // Should an order to arm be on its way, it is undone: closing the session switches the motors off.
             Stage::Listening | Stage::Checking if self.interrupt.came() => {
                 session.send(SessionOrder::Drive(DriveOrder::Release));
                 return Ok(Some(End::Interrupt));
@@ -210,12 +221,14 @@ impl Dialogue<'_> {
             // What is entered from here on stops the robot.
             Stage::Listening | Stage::Checking if self.arming.is_on_its_way(now) => {}
             Stage::Checking if drive.is_some_and(passed) => {
+                self.enter_stops.store(false, Ordering::Release);
                 self.arming.ready_at.get_or_insert(now);
                 if !self.arguments.arm {
                     return Ok(Some(End::Checked));
                 }
                 if self.agreed()? {
                     self.arming.ordered_at = Some(now);
+                    self.enter_stops.store(true, Ordering::Release);
                     session.send(SessionOrder::Drive(DriveOrder::Arm));
                 }
             }
@@ -227,12 +240,64 @@ impl Dialogue<'_> {
         Ok(None)
     }
 
-    fn ended(&mut self, now: Duration, end: &End) -> Result<(), Failure> {
-        self.lines.end(now, end)?;
-        match end {
-            End::Stopped(StopReason::Asked | StopReason::TimeOver | StopReason::Done) => Ok(()),
-            End::Stopped(reason) => Err(Failure::Message(format!("the robot was stopped: {reason}"))),
-            _ => Ok(()),
+    /// Prints the last line, and maps what the run has come to.
+    fn conclude(
+        mut self,
+        time: Duration,
+        held: Result<End, Failure>,
+        ending: Option<Ending>,
+    ) -> Result<(), Failure> {
+        let mut problems: Vec<String> = Vec::new();
+        let mut is_defect = false;
+        let end = match held {
+            Ok(end) => Some(end),
+            Err(Failure::ReaderGone) if self.driven_since.is_none() => return Err(Failure::ReaderGone),
+            Err(Failure::ReaderGone) => {
+                problems.push("the robot was stopped: standard output was closed".to_owned());
+                None
+            }
+            Err(Failure::Defect(problem)) => {
+                is_defect = true;
+                problems.push(problem);
+                None
+            }
+            Err(
+                Failure::Message(problem)
+                | Failure::Input(problem)
+                | Failure::Output(problem)
+                | Failure::Partial(problem),
+            ) => {
+                problems.push(problem);
+                None
+            }
+            Err(usage @ Failure::Usage(_)) => return Err(usage),
+        };
+        let signal = self.interrupt.signal();
+        match &end {
+            Some(End::Stopped(StopReason::Asked)) => {
+                let usual = signal.is_none_or(|signal| ["SIGINT", "SIGTERM", "Ctrl+C"].contains(&signal));
+                problems.extend(
+                    signal.filter(|_| !usual).map(|signal| format!("the robot was stopped: {signal} came")),
+                );
+            }
+            Some(End::Stopped(StopReason::TimeOver | StopReason::Done)) => {}
+            Some(End::Stopped(reason)) => problems.push(format!("the robot was stopped: {reason}")),
+            _ => {}
+        }
+        let Ending { motors_off, recording } = ending.unwrap_or_default();
+        if !motors_off {
+            let text = "the motors have not confirmed that they are off: switch their supply off";
+            problems.push(text.to_owned());
+        }
+        problems.extend(recording.as_ref().and_then(|recording| recording.problem.clone()));
+        let problem = (!problems.is_empty()).then(|| problems.join("; "));
+        let outcome = Outcome { problem: problem.clone(), signal, motors_off: Some(motors_off), recording };
+        let printed =
+            self.lines.end(time, end.as_ref(), outcome).and_then(|()| self.lines.finish(self.interrupt));
+        match problem {
+            None => printed,
+            Some(problem) if is_defect => Err(Failure::Defect(problem)),
+            Some(problem) => Err(Failure::Message(problem)),
         }
     }
 

@@ -36,7 +36,9 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "KEY=VALUE")]
     actual: Vec<Override>,
     /// What goes wrong and when, such as left-vanishes@10: {left|right}-vanishes, -returns, -errors=BITS,
-    /// -temperature=C, or voltage=V, imu-silent, imu-frozen, imu-returns, bus-off, bus-on, push=N; repeatable
+    /// -temperature=C, -encoder-frozen, -encoder-returns, -torque-reversed, -commanded=BYTE, or voltage=V, imu-silent,
+    /// imu-frozen, imu-angle-frozen, imu-rate-zero, imu-angle-off=RAD, imu-returns, torques-swapped, held, released,
+    /// bus-off, bus-on, push=N; repeatable
     #[arg(long, value_name = "FAULT@SECONDS")]
     fault: Vec<TimedFault>,
     /// Frames of other devices that fill the bus, in a second; each has its number in its first four bytes

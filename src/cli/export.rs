@@ -67,7 +67,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
             ids.join(", ")
         ));
     }
-    output.result(&Exported { controller: &controller, text: text.clone() }, |out| {
+    output.answer(&Exported { controller: &controller, text: text.clone() }, |out| {
         out.write_all(text.as_bytes())
     })
 }

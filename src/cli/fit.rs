@@ -88,6 +88,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     })
     .map_err(Failure::from_error)?;
     drop(bar);
+    let of_model = model.as_ref().map(input::warnings_of).unwrap_or_default();
     let keys = Fitted {
         parameters: &report.parameters,
         rmse: Quantity { value: report.rmse, unit: report.rmse_unit },
@@ -96,9 +97,9 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         iterations: report.iterations,
         history: &report.history,
         data_health: &report.data_health,
-        warnings: &report.warnings,
+        warnings: &[&report.warnings[..], &of_model].concat(),
     };
-    output.result(&keys, |out| print(out, &report))
+    output.answer(&keys, |out| print(out, &report))
 }
 
 fn print(out: &mut dyn Write, report: &FitReport) -> io::Result<()> {

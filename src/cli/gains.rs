@@ -60,7 +60,8 @@ struct Scheduled {
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
-    let (name, mut robot) = input::load_robot(&arguments.model)?;
+    let model = input::load_model(&arguments.model)?;
+    let (name, mut robot) = input::robot_of(&model, &arguments.model)?;
     let in_file = |problem: String| Failure::Message(format!("{}: {problem}", arguments.model.display()));
     if let Some(height) = arguments.leg_height {
         robot = robot.at_leg_height(height).map_err(|error| in_file(error.to_string()))?;
@@ -72,11 +73,12 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         }
         None => Vec::new(),
     };
-    let gains = Gains::new(&robot, &design, &schedule)?;
+    let mut gains = Gains::new(&robot, &design, &schedule)?;
     for warning in &gains.warnings {
         output::complain(&format!("warning: {warning}"));
     }
-    output.result(&gains, |out| print(out, &name, &design, &gains))
+    gains.warnings.extend(input::warnings_of(&model));
+    output.answer(&gains, |out| print(out, &name, &design, &gains))
 }
 
 /// The design of a loaded robot; the error names the file.

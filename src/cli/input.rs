@@ -6,7 +6,7 @@ use std::path::Path;
 
 use flqr_core::model_file::{Model, RobotModel};
 
-use super::output::Failure;
+use super::output::{Failure, complain};
 
 /// Largest text file that is read whole, bytes: a Riccati equation with 500 states is smaller.
 const LARGEST_TEXT: u64 = 64 << 20;
@@ -16,7 +16,7 @@ pub(crate) fn read_text(path: &Path) -> Result<String, Failure> {
     let mut text = String::new();
     let read = File::open(path).and_then(|file| file.take(LARGEST_TEXT + 1).read_to_string(&mut text));
     match read {
-        Ok(bytes) if bytes as u64 > LARGEST_TEXT => Err(Failure::Message(format!(
+        Ok(bytes) if bytes as u64 > LARGEST_TEXT => Err(Failure::Input(format!(
             "{}: the file is larger than the {} MiB that a text file may have: give the file that was meant",
             path.display(),
             LARGEST_TEXT >> 20
@@ -36,17 +36,31 @@ pub(crate) fn open(path: &Path) -> Result<(BufReader<File>, u64), Failure> {
     Ok((BufReader::with_capacity(1 << 16, file), about.len()))
 }
 
-/// Loads a model file.
+/// Loads a model file, and warns of values that look like a slip of the unit.
 pub(crate) fn load_model(path: &Path) -> Result<Model, Failure> {
-    Model::from_toml(&read_text(path)?, &path.display().to_string()).map_err(Failure::from_error)
+    let model =
+        Model::from_toml(&read_text(path)?, &path.display().to_string()).map_err(Failure::from_input)?;
+    for warning in model.warnings() {
+        complain(&format!("warning: {}: {warning}", path.display()));
+    }
+    Ok(model)
+}
+
+/// The warnings of a model as text, for results that list warnings.
+pub(crate) fn warnings_of(model: &Model) -> Vec<String> {
+    model.warnings().iter().map(ToString::to_string).collect()
 }
 
 /// Loads a model file that must describe a robot.
 pub(crate) fn load_robot(path: &Path) -> Result<(String, RobotModel), Failure> {
-    let model = load_model(path)?;
+    robot_of(&load_model(path)?, path)
+}
+
+/// Name and robot of a loaded model that must describe one.
+pub(crate) fn robot_of(model: &Model, path: &Path) -> Result<(String, RobotModel), Failure> {
     match model.robot() {
         Some(robot) => Ok((model.name.clone(), robot.clone())),
-        None => Err(Failure::Message(format!(
+        None => Err(Failure::Input(format!(
             "{}: this command needs a robot, but the file describes a single axis: give a model with a [robot] table",
             path.display()
         ))),
@@ -69,5 +83,5 @@ fn unreadable(path: &Path, error: &io::Error) -> Failure {
         io::ErrorKind::InvalidData => "this is not text: give the file that was meant".to_owned(),
         _ => format!("cannot read the file: {error}"),
     };
-    Failure::Message(format!("{}: {problem}", path.display()))
+    Failure::Input(format!("{}: {problem}", path.display()))
 }

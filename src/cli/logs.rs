@@ -57,7 +57,7 @@ fn read(path: &Path, map: &ColumnMap) -> Result<Log, Failure> {
         bar.set(progress.bytes, bytes);
         ControlFlow::Continue(())
     })
-    .map_err(Failure::from_error)
+    .map_err(Failure::from_input)
 }
 
 /// What every command is told that estimates numbers from logs.

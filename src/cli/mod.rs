@@ -2,11 +2,13 @@
 
 mod controller;
 mod convert;
+mod defect;
 mod demo;
 mod drive;
 mod emulate;
+mod error_keys;
 mod export;
-mod file;
+mod finite;
 mod fit;
 mod gains;
 mod imu;
@@ -16,6 +18,7 @@ mod interrupt;
 mod logs;
 mod monitor;
 mod output;
+mod output_file;
 mod printer;
 mod progress;
 mod refine;
@@ -29,21 +32,33 @@ mod window;
 
 use std::process::ExitCode;
 
+use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, Subcommand};
 
+pub(crate) use defect::guard;
+use error_keys::ErrorKeys;
 use output::{Failure, Output};
+
+/// What the help of the program ends with.
+const AFTER_HELP: &str = "\
+Exit codes: 0 done; 1 not done, or done in part; 2 wrong usage; 70 a defect of flqr; 130 interrupted. With --json an \
+error is one JSON object on standard output too: {\"error\": {code, message, file, line, column, remedy}}, null where \
+not known.
+
+Files: an output is never a file that the command reads. It replaces earlier results of flqr and empty files; a \
+recording, or a file that flqr did not write, only with --force. Outputs are checked before the work begins.";
 
 /// Tunes the balance controller of a wheel-legged robot: friction-feedforward LQR, closed with measured data.
 ///
 /// Without a command it opens the window. Numbers are SI, angles in rad.
 #[derive(Parser)]
-#[command(name = "flqr", version)]
+#[command(name = "flqr", version, after_help = AFTER_HELP)]
 pub(crate) struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
     #[command(flatten)]
     window: window::Arguments,
-    /// Print one JSON object on standard output and nothing else there
+    /// Print one JSON object on standard output and nothing else there, an error too
     #[arg(long, global = true)]
     json: bool,
 }
@@ -84,14 +99,30 @@ enum Command {
     Timing(timing::Arguments),
 }
 
-/// Runs the command and maps its outcome to an exit code: 0 done, 1 could not be done.
-pub(crate) fn run(cli: Cli) -> ExitCode {
-    if cli.command.is_some() && cli.window != window::Arguments::default() {
+/// Exit code of what was not done, or in part.
+const FAILED: u8 = 1;
+/// Exit code of a wrong command line.
+const WRONG_USAGE: u8 = 2;
+
+/// Runs the command line and maps its outcome to an exit code.
+pub(crate) fn run() -> ExitCode {
+    let parsed = Cli::try_parse().and_then(|cli| {
         let message = "the flags of the window stand alone: give a command its flags behind its name";
-        Cli::command().error(clap::error::ErrorKind::ArgumentConflict, message).exit();
+        match cli.command.is_some() && cli.window != window::Arguments::default() {
+            true => Err(Cli::command().error(ErrorKind::ArgumentConflict, message)),
+            false => Ok(cli),
+        }
+    });
+    match parsed.map_err(Failure::Usage).and_then(done) {
+        Ok(()) | Err(Failure::ReaderGone) => ExitCode::SUCCESS,
+        Err(failure) => report(failure),
     }
+}
+
+/// Runs the command.
+fn done(cli: Cli) -> Result<(), Failure> {
     let output = Output::new(cli.json);
-    let done = match cli.command {
+    match cli.command {
         None => window::run(cli.window),
         Some(Command::Gains(arguments)) => gains::run(&arguments, &output),
         Some(Command::Riccati(arguments)) => riccati::run(&arguments, &output),
@@ -109,15 +140,41 @@ pub(crate) fn run(cli: Cli) -> ExitCode {
         Some(Command::Interfaces) => interfaces::run(&output),
         Some(Command::Imu(arguments)) => imu::run(&arguments, &output),
         Some(Command::Timing(arguments)) => timing::run(&arguments, &output),
-    };
-    match done {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(Failure::ReaderGone) => ExitCode::SUCCESS,
-        Err(Failure::Message(message)) => {
-            output::complain(&message);
-            ExitCode::FAILURE
-        }
     }
+}
+
+/// Says why a command ended; gives its exit code.
+fn report(failure: Failure) -> ExitCode {
+    let (code, message, exit) = match failure {
+        Failure::Usage(error) => return report_usage(&error),
+        Failure::Message(message) => ("failed", message, FAILED),
+        Failure::Input(message) => ("input_file", message, FAILED),
+        Failure::Output(message) => ("output_file", message, FAILED),
+        Failure::Defect(message) => ("defect", message, defect::EXIT_CODE),
+        Failure::Partial(message) => {
+            output::complain(&message);
+            return ExitCode::from(FAILED);
+        }
+        Failure::ReaderGone => return ExitCode::SUCCESS,
+    };
+    output::complain(&message);
+    if error_keys::wanted() {
+        ErrorKeys::new(code, &message).print();
+    }
+    ExitCode::from(exit)
+}
+
+/// Prints what is wrong with the command line, or the help that it asks for.
+fn report_usage(error: &clap::Error) -> ExitCode {
+    // Nobody reads it: the exit code says the same.
+    error.print().unwrap_or(());
+    if !error.use_stderr() {
+        return ExitCode::SUCCESS;
+    }
+    if error_keys::wanted() {
+        ErrorKeys::usage(&error.to_string()).print();
+    }
+    ExitCode::from(WRONG_USAGE)
 }
 
 #[cfg(test)]

@@ -10,9 +10,9 @@ use flqr_core::link::dbc::Choice;
 use flqr_core::model_file::presets;
 
 use super::input;
-use super::interrupt::Interrupt;
+use super::interrupt::{Duty, Interrupt};
 use super::output::{Failure, Output};
-use super::robot_lines::{End, Lines, died};
+use super::robot_lines::{End, Lines, Outcome, died};
 
 #[derive(Args)]
 pub(crate) struct Arguments {
@@ -81,31 +81,42 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         seed: arguments.seed,
         replay_speed: arguments.speed,
     };
-    let interrupt = Interrupt::watch()?;
+    let interrupt = Interrupt::watch(Duty::Monitor)?;
+    // A recording can wait for whoever reads its lines, a robot cannot.
+    let is_replay = matches!(options.source, Source::Replay { .. });
     let mut session = Session::open(options, Arc::new(|| {})).map_err(Failure::from_error)?;
-    let mut lines = Lines::new(output);
+    let mut lines = if is_replay { Lines::patient(output, &interrupt)? } else { Lines::start(output)? };
     let mut time = Duration::ZERO;
     let end = arguments.seconds.map_or(Duration::MAX, Duration::from_secs_f64);
     let reason = loop {
         if interrupt.came() {
-            break End::Interrupt;
+            break Some(End::Interrupt);
         }
         if time >= end {
-            break End::Time;
+            break Some(End::Time);
         }
         // Asked before, so that the last updates of a thread that has ended are read.
         let is_over = session.has_died();
         let Some(update) = session.wait(Duration::from_millis(100)) else {
             if is_over {
-                return Err(died());
+                break None;
             }
             continue;
         };
         time = update.status.time;
         lines.update(&update)?;
         if update.status.connection == Connection::Ended {
-            break End::Recording;
+            break Some(End::Recording);
         }
     };
-    lines.end(time, &reason)
+    let recording = session.close().and_then(|ending| ending.recording);
+    let problem = match reason {
+        None => Some(died()),
+        Some(_) => recording.as_ref().and_then(|recording| recording.problem.clone()),
+    };
+    let signal = interrupt.signal();
+    let outcome = Outcome { problem: problem.clone(), signal, motors_off: None, recording };
+    lines.end(time, reason.as_ref(), outcome)?;
+    lines.finish(&interrupt)?;
+    problem.map_or(Ok(()), |problem| Err(Failure::Message(problem)))
 }

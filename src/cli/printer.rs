@@ -12,6 +12,8 @@ use super::output::Failure;
 
 /// Lines that may wait before those that can be spared are dropped.
 const MOST_WAITING: usize = 256;
+/// Time between two looks at the reader.
+const LOOK: Duration = Duration::from_millis(2);
 /// How long, after an interrupt, a reader that takes no line is waited for.
 const PATIENCE: Duration = Duration::from_secs(2);
 
@@ -54,6 +56,14 @@ impl Printer {
         Ok(())
     }
 
+    /// Waits until a line that is offered is not dropped, or until an interrupt.
+    pub(super) fn wait_for_room(&self, interrupt: &Interrupt) {
+        let lives = || self.thread.as_ref().is_some_and(|thread| !thread.is_finished());
+        while self.waiting.load(Ordering::Relaxed) >= MOST_WAITING && lives() && !interrupt.came() {
+            sleep(LOOK);
+        }
+    }
+
     /// Lines that were spared.
     pub(super) fn dropped(&self) -> u64 {
         self.dropped
@@ -65,7 +75,7 @@ impl Printer {
         let mut left = self.waiting.load(Ordering::Relaxed);
         let mut since = Instant::now();
         while self.thread.as_ref().is_some_and(|thread| !thread.is_finished()) {
-            sleep(Duration::from_millis(2));
+            sleep(LOOK);
             let now_left = self.waiting.load(Ordering::Relaxed);
             if now_left != left || !interrupt.came() {
                 (left, since) = (now_left, Instant::now());
@@ -81,7 +91,9 @@ impl Printer {
     /// What the thread, which ends by itself, came to.
     fn join(&mut self) -> Result<(), Failure> {
         let printed = self.thread.take().map_or(Ok(Ok(())), JoinHandle::join);
-        Ok(printed.unwrap_or_else(|_| Err(io::ErrorKind::Other.into()))?)
+        let defect =
+            |_| Failure::Defect("the thread that prints has ended by a defect of flqr: report it".to_owned());
+        Ok(printed.map_err(defect)??)
     }
 }
 
@@ -125,12 +137,30 @@ mod tests {
         printer.keep(b"end\n".to_vec()).unwrap();
         assert_eq!(printer.dropped(), 1000 - MOST_WAITING as u64);
         let told = Interrupt::default();
-        told.raise();
+        told.raise(1);
         drop(stalled);
         printer.finish(&told).unwrap();
         let mut expected: String = (0..MOST_WAITING).map(|line| format!("status {line}\n")).collect();
         expected += "event\nend\n";
         assert_eq!(String::from_utf8(gate.0.lock().unwrap().clone()).unwrap(), expected);
+    }
+
+    #[test]
+    fn a_slow_reader_is_waited_for_until_an_interrupt() {
+        let gate = Gate::default();
+        let mut printer = Printer::start(gate.clone()).unwrap();
+        let told = Interrupt::default();
+        for line in 0..2 * MOST_WAITING {
+            printer.wait_for_room(&told);
+            printer.offer(format!("status {line}\n").into_bytes()).unwrap();
+        }
+        assert_eq!(printer.dropped(), 0);
+        let stalled = gate.0.lock().unwrap();
+        (0..=MOST_WAITING).for_each(|_| printer.offer(b"status\n".to_vec()).unwrap());
+        told.raise(1);
+        printer.wait_for_room(&told);
+        drop(stalled);
+        printer.finish(&told).unwrap();
     }
 
     #[test]
@@ -140,7 +170,7 @@ mod tests {
         let stalled = gate.0.lock().unwrap();
         printer.keep(b"end\n".to_vec()).unwrap();
         let told = Interrupt::default();
-        told.raise();
+        told.raise(1);
         let Err(Failure::Message(message)) = printer.finish(&told) else { panic!("it was printed") };
         assert!(message.starts_with("1 lines were not printed"), "{message}");
         drop(stalled);

@@ -2,16 +2,17 @@
 
 use std::io::{self, Write};
 use std::ops::ControlFlow;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use flqr_core::refine::{self, ClosedLoop, Corrected, Fate, LoopRun, Options, Refinement, Verdict};
 
+use super::input;
 use super::logs::print_health;
-use super::output::{Failure, Output, complain, number};
+use super::output::{Failure, Output, check_finite, complain, number};
+use super::output_file::{self, Force, OutputFile};
 use super::progress::Progress;
 use super::residual::{Asked, print_errors};
-use super::{file, input};
 
 #[derive(Args)]
 pub(crate) struct Arguments {
@@ -38,28 +39,57 @@ pub(crate) struct Kept {
     /// Write the report with its figures as one HTML file
     #[arg(long, value_name = "OUT.html")]
     report: Option<PathBuf>,
+    #[command(flatten)]
+    force: Force,
 }
 
 impl Kept {
-    pub(crate) fn write(&self, found: &Refinement) -> Result<(), Failure> {
-        if let (Some(path), Verdict::DataUnfit) = (&self.out, found.verdict) {
-            complain(&format!(
-                "{} is not written: the logs cannot answer, so that nothing is refined",
-                path.display()
-            ));
-        } else if let Some(path) = &self.out {
-            file::write(path, "model", |out| out.write_all(found.model.to_toml().as_bytes()))?;
-            complain(&format!("the refined model is in {}", path.display()));
+    fn model_file(&self) -> Option<OutputFile<'_>> {
+        self.out.as_deref().map(|path| OutputFile::new(path, "model"))
+    }
+
+    fn report_file(&self) -> Option<OutputFile<'_>> {
+        self.report.as_deref().map(|path| OutputFile::new(path, "report"))
+    }
+
+    /// Checks the outputs of a command that reads these files.
+    pub(crate) fn check(&self, inputs: &[&Path]) -> Result<(), Failure> {
+        let outputs: Vec<_> = self.model_file().into_iter().chain(self.report_file()).collect();
+        output_file::check(inputs, &outputs, self.force)
+    }
+
+    /// Writes the outputs, then prints the answer with `print`: it is one also where there is no model to write.
+    pub(crate) fn write(
+        &self,
+        found: &Refinement,
+        print: impl FnOnce() -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        check_finite(found)?;
+        if let Some(file) = self.report_file() {
+            file.write(|out| out.write_all(found.document.to_html().as_bytes()))?;
+            complain(&format!("the report with its figures is in {}", file.path.display()));
         }
-        if let Some(path) = &self.report {
-            file::write(path, "report", |out| out.write_all(found.document.to_html().as_bytes()))?;
-            complain(&format!("the report with its figures is in {}", path.display()));
+        let Some(file) = self.model_file() else { return print() };
+        let path = file.path.display();
+        if found.verdict != Verdict::DataUnfit {
+            file.write_model(&found.model.to_toml())?;
+            complain(&format!("the refined model is in {path}"));
+            return print();
         }
-        Ok(())
+        let earlier = match file.put_aside()? {
+            Some(earlier) => format!(" (the file of before is now {})", earlier.display()),
+            None => String::new(),
+        };
+        print()?;
+        Err(Failure::Partial(format!(
+            "{path}: no model is written{earlier}, because the logs cannot answer: see data_health, and record again"
+        )))
     }
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
+    let inputs = [&arguments.model].into_iter().chain(&arguments.logs).chain(&arguments.heldout);
+    arguments.kept.check(&inputs.map(PathBuf::as_path).collect::<Vec<_>>())?;
     let model = input::load_model(&arguments.model)?;
     let columns = &arguments.asked.estimated.columns;
     let logs = columns.read(&arguments.logs)?;
@@ -73,8 +103,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     })
     .map_err(Failure::from_error)?;
     drop(bar);
-    arguments.kept.write(&found)?;
-    output.result(&found, |out| print(out, &found))
+    arguments.kept.write(&found, || output.answer(&found, |out| print(out, &found)))
 }
 
 /// Most lines about what was tried and not added.

@@ -9,9 +9,10 @@ use clap::Args;
 use flqr_core::model_file::{Model, presets};
 use flqr_core::reproduce::{self, DEFAULT_SEEDS, Settings};
 
+use super::input;
 use super::output::{Failure, Output, complain};
+use super::output_file::{self, Force, OutputFile};
 use super::progress::Progress;
-use super::{file, input};
 
 #[derive(Args)]
 pub(crate) struct Arguments {
@@ -29,9 +30,14 @@ pub(crate) struct Arguments {
     /// Write the report with its figures as one HTML file
     #[arg(long, value_name = "OUT.html")]
     report: Option<PathBuf>,
+    #[command(flatten)]
+    force: Force,
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
+    let report = arguments.report.as_deref().map(|path| OutputFile::new(path, "report"));
+    let inputs: Vec<_> = arguments.model.iter().map(PathBuf::as_path).collect();
+    output_file::check(&inputs, report.as_slice(), arguments.force)?;
     let (model, text) = load(arguments)?;
     let every = || thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
     let settings = Settings {
@@ -50,14 +56,14 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         Some(path) => Failure::Message(format!("{}: {error}", path.display())),
         None => Failure::from_error(error),
     })?;
-    match &arguments.report {
-        Some(path) => {
-            file::write(path, "report", |out| out.write_all(found.document.to_html().as_bytes()))?;
-            complain(&format!("the report with its figures is in {}", path.display()));
+    match report {
+        Some(file) => {
+            file.write(|out| out.write_all(found.document.to_html().as_bytes()))?;
+            complain(&format!("the report with its figures is in {}", file.path.display()));
         }
         None => complain("the figures are in the report: --report OUT.html writes it"),
     }
-    output.result(&found, |out| out.write_all(found.document.to_text().as_bytes()))
+    output.answer(&found, |out| out.write_all(found.document.to_text().as_bytes()))
 }
 
 /// The model and its file's text, in which comments say where its numbers come from.

@@ -64,7 +64,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     })
     .map_err(Failure::from_error)?;
     drop(bar);
-    output.result(&found, |out| print(out, &found))
+    output.answer(&found, |out| print(out, &found))
 }
 
 fn print(out: &mut dyn Write, found: &Residual) -> io::Result<()> {

@@ -59,7 +59,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         riccati_residual: solution.relative_residual,
         warnings: solution.warnings.clone(),
     };
-    output.result(&keys, |out| {
+    output.answer(&keys, |out| {
         writeln!(out, "P ={:.9e}", solution.p)?;
         if let Some(gain) = &solution.gain {
             writeln!(out, "K ={gain:.9e}")?;

@@ -4,7 +4,9 @@ use std::io::{self, Write};
 use std::time::Duration;
 
 use flqr_core::control::drive::{Check, CheckResult, StopReason};
-use flqr_core::device::{Connection, Counters, ImuStatus, MotorStatus, Status, Timing, Update};
+use flqr_core::device::{
+    Connection, Counters, ImuStatus, MotorStatus, RecordingStatus, Status, Timing, Update,
+};
 use flqr_core::record::Sample;
 use serde::Serialize;
 
@@ -17,11 +19,11 @@ const JSON_INTERVAL: Duration = Duration::from_millis(100);
 /// Time between two lines of text.
 const TEXT_INTERVAL: Duration = Duration::from_secs(1);
 
-/// The error where a session's thread has ended by itself.
-pub(super) fn died() -> Failure {
-    let text = "the session's thread has ended by itself, which is a fault of this program: make sure that the motors \
-                are off, and report it";
-    Failure::Message(text.to_owned())
+/// What is to be said where a session's thread has ended without being asked to.
+pub(super) fn died() -> String {
+    "the session's thread has ended unexpectedly, which is a defect of flqr: make sure that the motors are off, and \
+     report it"
+        .to_owned()
 }
 
 /// Prints updates.
@@ -30,8 +32,9 @@ pub(super) struct Lines<'a> {
     next: Duration,
     newest: Option<Sample>,
     checks: Vec<Check>,
-    /// None where lines are printed at once, however long the reader takes.
-    printer: Option<Printer>,
+    printer: Printer,
+    /// Where given, a slow reader is waited for until this interrupt: nothing is lost but time.
+    patience: Option<Interrupt>,
 }
 
 /// Why there is nothing more to tell.
@@ -79,9 +82,34 @@ enum Line<'a> {
         time_s: f64,
         stopped_by: Option<&'static str>,
         text: String,
+        #[serde(flatten)]
+        outcome: OutcomeLine,
         /// Status lines that nobody took in time.
         lines_dropped: u64,
     },
+}
+
+/// What a run has come to, beyond why it ended.
+#[derive(Default)]
+pub(super) struct Outcome {
+    /// What was not done, or in part.
+    pub(super) problem: Option<String>,
+    /// The signal by which the program was asked to end.
+    pub(super) signal: Option<&'static str>,
+    /// Whether the motors have confirmed that they are off; of a run that may drive.
+    pub(super) motors_off: Option<bool>,
+    /// The complete recording.
+    pub(super) recording: Option<RecordingStatus>,
+}
+
+#[derive(Serialize)]
+struct OutcomeLine {
+    problem: Option<String>,
+    signal: Option<&'static str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    motors_off: Option<bool>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    recording: Option<RecordingLine>,
 }
 
 #[derive(Serialize)]
@@ -126,6 +154,7 @@ struct MotorLine {
     temperature_c: Option<f64>,
     current_a: Option<f64>,
     voltage_v: Option<f64>,
+    round_trip_s: Option<f64>,
     errors: Vec<&'static str>,
 }
 
@@ -165,20 +194,22 @@ struct TimingLine {
 struct RecordingLine {
     file: String,
     rows: u64,
+    rows_lost: u64,
     frames: u64,
     bytes: u64,
     problem: Option<String>,
 }
 
 impl<'a> Lines<'a> {
-    /// Lines that are printed at once, however long their reader takes.
-    pub(super) fn new(output: &'a Output) -> Self {
-        Self { output, next: Duration::ZERO, newest: None, checks: Vec::new(), printer: None }
+    /// Lines whose reader is never waited for. A slow one loses status lines, which are counted, and nothing else.
+    pub(super) fn start(output: &'a Output) -> Result<Self, Failure> {
+        let printer = Printer::start(io::stdout())?;
+        Ok(Self { output, next: Duration::ZERO, newest: None, checks: Vec::new(), printer, patience: None })
     }
 
-    /// Lines that are never waited for. A slow reader loses status lines, which are counted, and nothing else.
-    pub(super) fn apart(output: &'a Output) -> Result<Self, Failure> {
-        Ok(Self { printer: Some(Printer::start(io::stdout())?), ..Self::new(output) })
+    /// Lines whose reader is waited for until an interrupt.
+    pub(super) fn patient(output: &'a Output, interrupt: &Interrupt) -> Result<Self, Failure> {
+        Ok(Self { patience: Some(interrupt.clone()), ..Self::start(output)? })
     }
 
     /// Events and checks that have changed at once, the status when it is due.
@@ -204,12 +235,15 @@ impl<'a> Lines<'a> {
         Ok(())
     }
 
-    /// The last line.
-    pub(super) fn end(&mut self, time: Duration, end: &End) -> Result<(), Failure> {
-        let stopped_by = if let End::Stopped(reason) = end { Some(reason.name()) } else { None };
-        let (time_s, text) = (time.as_secs_f64(), end.text());
-        let lines_dropped = self.printer.as_ref().map_or(0, Printer::dropped);
-        let line = Line::End { time_s, stopped_by, text: text.clone(), lines_dropped };
+    /// The last line, also of a run that failed; `end` is `None` where the outcome's problem is all that there is to
+    /// say.
+    pub(super) fn end(&mut self, time: Duration, end: Option<&End>, outcome: Outcome) -> Result<(), Failure> {
+        let stopped_by = if let Some(End::Stopped(reason)) = end { Some(reason.name()) } else { None };
+        let time_s = time.as_secs_f64();
+        let text = end.map(End::text).or(outcome.problem.clone()).unwrap_or_default();
+        let lines_dropped = self.printer.dropped();
+        let line =
+            Line::End { time_s, stopped_by, text: text.clone(), outcome: outcome.into(), lines_dropped };
         self.print(&line, |out| {
             if lines_dropped > 0 {
                 writeln!(
@@ -223,7 +257,7 @@ impl<'a> Lines<'a> {
 
     /// Waits until all is printed; after an interrupt only for a reader that still takes lines.
     pub(super) fn finish(self, interrupt: &Interrupt) -> Result<(), Failure> {
-        self.printer.map_or(Ok(()), |printer| printer.finish(interrupt))
+        self.printer.finish(interrupt)
     }
 
     fn print(
@@ -231,12 +265,14 @@ impl<'a> Lines<'a> {
         line: &Line,
         text: impl FnOnce(&mut dyn Write) -> io::Result<()>,
     ) -> Result<(), Failure> {
-        let Some(printer) = &mut self.printer else { return self.output.result(line, text) };
         let mut bytes = Vec::new();
         self.output.write(&mut bytes, line, text)?;
+        if let Some(interrupt) = &self.patience {
+            self.printer.wait_for_room(interrupt);
+        }
         match line {
-            Line::Status(_) => printer.offer(bytes),
-            Line::Event { .. } | Line::Check { .. } | Line::End { .. } => printer.keep(bytes),
+            Line::Status(_) => self.printer.offer(bytes),
+            Line::Event { .. } | Line::Check { .. } | Line::End { .. } => self.printer.keep(bytes),
         }
     }
 
@@ -285,14 +321,28 @@ impl StatusLine {
             imu: ImuLine::new(&status.imu),
             bus: BusLine::new(&status.counters),
             timing: TimingLine::new(&status.timing),
-            recording: status.recording.as_ref().map(|recording| RecordingLine {
-                file: recording.file.display().to_string(),
-                rows: recording.rows,
-                frames: recording.frames,
-                bytes: recording.bytes,
-                problem: recording.problem.clone(),
-            }),
+            recording: status.recording.as_ref().map(RecordingLine::new),
         }
+    }
+}
+
+impl RecordingLine {
+    fn new(recording: &RecordingStatus) -> Self {
+        Self {
+            file: recording.file.display().to_string(),
+            rows: recording.rows,
+            rows_lost: recording.rows_lost,
+            frames: recording.frames,
+            bytes: recording.bytes,
+            problem: recording.problem.clone(),
+        }
+    }
+}
+
+impl From<Outcome> for OutcomeLine {
+    fn from(outcome: Outcome) -> Self {
+        let Outcome { problem, signal, motors_off, recording } = outcome;
+        Self { problem, signal, motors_off, recording: recording.as_ref().map(RecordingLine::new) }
     }
 }
 
@@ -314,6 +364,7 @@ impl MotorLine {
             temperature_c: status.temperature_c,
             current_a: status.current_a,
             voltage_v: status.health.map(|health| health.voltage_v),
+            round_trip_s: status.health.and_then(|health| health.round_trip).map(|time| time.as_secs_f64()),
             errors: status.health.map_or(Vec::new(), |health| health.errors.names().collect()),
         }
     }
@@ -379,11 +430,13 @@ fn text(out: &mut dyn Write, status: &Status, newest: Option<&Sample>) -> io::Re
         )?;
     }
     let [left, right] = status.motors.map(|motor| motor.rate_hz);
+    let round_trip = status.motors.iter().filter_map(|motor| motor.health?.round_trip).max();
+    let round_trip = round_trip.map_or(String::new(), |time| format!(" {:.1} ms", 1e3 * time.as_secs_f64()));
     let Counters { received_hz, bus_load, dropped, lost, errors, late, reconnects, .. } = status.counters;
     let load = bus_load.map_or(String::new(), |load| format!(" ({:.0} % of the bus)", 100.0 * load));
     write!(
         out,
-        "motors {left:.0} {right:.0} Hz  IMU {:.0} Hz  {received_hz:.0} frames/s{load}",
+        "motors {left:.0} {right:.0} Hz{round_trip}  IMU {:.0} Hz  {received_hz:.0} frames/s{load}",
         status.imu.rate_hz
     )?;
     let counts = [

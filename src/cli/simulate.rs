@@ -1,5 +1,6 @@
 //! `flqr simulate`: the simulated robot in a scenario.
 
+use std::fmt::Display;
 use std::io::{self, Write};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -20,8 +21,9 @@ use serde::Serialize;
 
 use super::logs::MotorName;
 use super::output::{Failure, Output, complain};
+use super::output_file::{self, Force, OutputFile};
 use super::progress::Progress;
-use super::{Cli, file, input};
+use super::{Cli, input};
 
 #[derive(Args)]
 pub(crate) struct Arguments {
@@ -42,6 +44,8 @@ pub(crate) struct Arguments {
     /// Write the run as a robot log, in the air as a bench log of one motor
     #[arg(long, value_name = "OUT.csv")]
     log: Option<PathBuf>,
+    #[command(flatten)]
+    force: Force,
     /// Seed of all noise
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -65,6 +69,16 @@ pub(crate) struct Arguments {
     leg_height: Option<f64>,
     #[command(flatten)]
     settings: ScenarioSettings,
+}
+
+impl Arguments {
+    fn log_file(&self) -> Option<OutputFile<'_>> {
+        self.log.as_deref().map(|path| OutputFile::new(path, "log"))
+    }
+}
+
+fn wrong_usage(refused: impl Display) -> Failure {
+    Failure::Usage(Cli::command().error(ErrorKind::ArgumentConflict, refused))
 }
 
 /// What a scenario itself can be told.
@@ -173,12 +187,15 @@ fn not_negative(text: &str) -> Result<f64, String> {
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let mut experiment = experiment(arguments);
     if let Err(refused) = experiment.check_usage() {
-        Cli::command().error(ErrorKind::ArgumentConflict, refused).exit();
+        return Err(wrong_usage(refused));
     }
     if experiment.on_ground() && arguments.motor.is_some() {
         let refused = "--motor has no effect on the ground, where a log holds both: leave it out";
-        Cli::command().error(ErrorKind::ArgumentConflict, refused).exit();
+        return Err(wrong_usage(refused));
     }
+    let inputs: Vec<&Path> =
+        [&arguments.model].into_iter().chain(&arguments.robot).map(PathBuf::as_path).collect();
+    output_file::check(&inputs, arguments.log_file().as_slice(), arguments.force)?;
     let declared = input::load_model(&arguments.model)?;
     if let (Some(payload), None, Some(robot)) =
         (&mut experiment.payload, arguments.settings.payload_height, declared.robot())
@@ -204,16 +221,22 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         Err(_) => None,
     };
     let motor = arguments.motor.map_or(Motor::Left, Motor::from);
-    if let (Some(path), Some(kept)) = (&arguments.log, kept) {
-        write_log(path, kept, motor)?;
+    if let (Some(file), Some(kept)) = (arguments.log_file(), kept) {
+        let log = kept.log(motor);
+        file.write(|out| record::write_log(&log, out))?;
     }
     let title = title(&experiment, &declared, actual);
+    let mut of_models = input::warnings_of(&declared);
+    if *actual != declared {
+        of_models.extend(input::warnings_of(actual));
+    }
+    let with = |warnings: &[String]| [warnings, &of_models].concat();
     match &outcome.map_err(in_file)? {
-        Outcome::Ground(run) => report_ground(output, &title, run),
+        Outcome::Ground(run) => report_ground(output, &title, run, &with(&run.warnings)),
         Outcome::Bench(run) => {
             let side = if motor == Motor::Left { "left" } else { "right" };
             let of = declared.robot().map_or(String::new(), |_| format!(", {side} motor"));
-            report_bench(output, &format!("{title}{of}"), run, motor)
+            report_bench(output, &format!("{title}{of}"), run, motor, &with(&run.warnings))
         }
     }
 }
@@ -266,12 +289,7 @@ fn simulated(experiment: &Experiment, declared: &Model, actual: &Model) -> Resul
     })
 }
 
-fn write_log(path: &Path, outcome: &Outcome, motor: Motor) -> Result<(), Failure> {
-    let log = outcome.log(motor);
-    file::write(path, "log", |out| record::write_log(&log, out))
-}
-
-fn report_ground(output: &Output, title: &str, run: &Run) -> Result<(), Failure> {
+fn report_ground(output: &Output, title: &str, run: &Run, warnings: &[String]) -> Result<(), Failure> {
     let Statistics { from_s, x_m, x_dot_m_s, pitch_rad, settled, fell } = run.statistics;
     let keys = Simulated {
         statistics: Quantities::Ground { x_m, x_dot_m_s, pitch_rad },
@@ -280,7 +298,7 @@ fn report_ground(output: &Output, title: &str, run: &Run) -> Result<(), Failure>
         fall: run.fall.map(|fall| Fallen { time_s: fall.time_s, state: fall.state }),
         target_x_m: Some(run.target_x_m),
         tracking: None,
-        warnings: &run.warnings,
+        warnings,
     };
     if let Some(fall) = &run.fall {
         let State { x_m, x_dot_m_s, pitch_rad, pitch_rate_rad_s } = fall.state;
@@ -290,14 +308,20 @@ fn report_ground(output: &Output, title: &str, run: &Run) -> Result<(), Failure>
             fall.time_s
         ));
     }
-    output.result(&keys, |out| {
+    output.answer(&keys, |out| {
         writeln!(out, "{title}; from {from_s} s on, target x {} m\n", run.target_x_m)?;
         table(out, &[("x, m", x_m), ("x_dot, m/s", x_dot_m_s), ("pitch, rad", pitch_rad)])?;
         writeln!(out, "\nsettled: {}, fell: {}", yes(settled), yes(fell))
     })
 }
 
-fn report_bench(output: &Output, title: &str, run: &BenchRun, motor: Motor) -> Result<(), Failure> {
+fn report_bench(
+    output: &Output,
+    title: &str,
+    run: &BenchRun,
+    motor: Motor,
+    warnings: &[String],
+) -> Result<(), Failure> {
     let [motor_speed_rad_s, torque_nm] = run.statistics(motor);
     let keys = Simulated {
         statistics: Quantities::Bench { motor_speed_rad_s, torque_nm },
@@ -306,9 +330,9 @@ fn report_bench(output: &Output, title: &str, run: &BenchRun, motor: Motor) -> R
         fall: None,
         target_x_m: None,
         tracking: run.tracking.map(|[left, right]| Tracking { left, right }),
-        warnings: &run.warnings,
+        warnings,
     };
-    output.result(&keys, |out| {
+    output.answer(&keys, |out| {
         writeln!(out, "{title}\n")?;
         table(out, &[("speed, rad/s", motor_speed_rad_s), ("torque, N m", torque_nm)])?;
         let Some(tracking) = run.tracking else { return Ok(()) };

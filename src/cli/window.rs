@@ -8,8 +8,9 @@ use flqr_core::model_file::presets;
 use flqr_gui::{Tab, WindowOptions};
 
 use super::input;
+use super::interrupt::{Duty, Interrupt};
 use super::logs::Columns;
-use super::output::Failure;
+use super::output::{Failure, complain};
 
 #[derive(Args, Default, PartialEq)]
 pub(crate) struct Arguments {
@@ -67,6 +68,18 @@ pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
         (Some(TabName::Runs), _) => Tab::Runs,
         (Some(TabName::Tune), _) | (None, None) => Tab::Tune,
     };
+    let usual = WindowOptions::new(model);
+    let state_folder = flqr_gui::default_state_folder();
+    let has_folders = state_folder.is_some() && usual.recent_file.is_some();
+    let warning = (!has_folders).then(|| {
+        let name = if cfg!(windows) { "LOCALAPPDATA and APPDATA" } else { "HOME" };
+        format!(
+            "session or recent files will not be kept, because {name} is empty or not set: set it to a folder"
+        )
+    });
+    if let Some(warning) = &warning {
+        complain(&format!("warning: {warning}"));
+    }
     let options = WindowOptions {
         model_path: arguments.model,
         log: arguments.log,
@@ -77,9 +90,11 @@ pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
         paused: arguments.paused,
         state_out: arguments.state_out,
         session: arguments.session,
-        state_folder: flqr_gui::default_state_folder(),
+        state_folder,
+        warning,
         tour,
-        ..WindowOptions::new(model)
+        ..usual
     };
+    Interrupt::watch(Duty::Window)?;
     flqr_gui::run(options).map_err(Failure::from_error)
 }

@@ -18,6 +18,7 @@
 //! | [`reproduce`] | every experiment of the paper, ours beside theirs |
 //! | [`export`] | a controller as C header, JSON, YAML or CSV |
 //! | [`model_file`] | models on disk (TOML) |
+//! | [`message`] | messages fit to be shown |
 //!
 //! # Invariants
 //! - SI units and radians everywhere; a name carries its unit where it has one.
@@ -34,6 +35,7 @@ pub mod friction;
 pub mod identify;
 pub mod link;
 pub mod lqr;
+pub mod message;
 pub mod model_file;
 pub mod parallel;
 mod parameter;
@@ -43,6 +45,7 @@ pub mod report;
 pub mod reproduce;
 pub mod robot;
 pub mod simulate;
+mod unit_slip;
 
 #[cfg(test)]
 extern crate self as flqr_core;

@@ -1,5 +1,7 @@
 //! Checks that every physical parameter passes once, at the border of the core.
 
+use std::borrow::Cow;
+
 /// A physical parameter whose value no robot can have.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{name} = {value} is out of range: it must be {allowed}")]
@@ -9,7 +11,7 @@ pub struct ParameterError {
     /// The refused value.
     pub value: f64,
     /// The values that are allowed, in words.
-    pub allowed: &'static str,
+    pub allowed: Cow<'static, str>,
 }
 
 /// Refuses values that are not finite or not above zero.
@@ -38,5 +40,9 @@ pub(crate) fn within(
 }
 
 fn check(name: &'static str, value: f64, ok: bool, allowed: &'static str) -> Result<(), ParameterError> {
-    if value.is_finite() && ok { Ok(()) } else { Err(ParameterError { name, value, allowed }) }
+    if value.is_finite() && ok {
+        Ok(())
+    } else {
+        Err(ParameterError { name, value, allowed: allowed.into() })
+    }
 }

@@ -191,6 +191,9 @@ impl App {
         };
         app.reset_live();
         app.say_loaded();
+        if let Some(warning) = options.warning {
+            app.messages.stand(warning);
+        }
         if let Some(log) = options.log {
             app.commands.send(match options.tab {
                 Tab::Refine => Command::Refine(RefineCommand::Load { path: log, held_out: false }),
@@ -264,6 +267,7 @@ impl App {
             experiment_runs: self.experiments.is_running(),
             is_connected: self.link.options().is_some(),
             is_hot: self.link.is_hot(),
+            gains_wait: self.link.transfer.pending().is_some(),
             controller: self.session.controller,
             model_path: self.model_path.as_deref(),
             can_undo: self.undo.peek(false).is_some(),
@@ -509,14 +513,14 @@ impl App {
 
     fn send_robot(&mut self) {
         if let Some((robot, controller)) = self.robot_and_controller() {
-            self.link.set_controller(controller.clone());
+            self.link.set_design(controller.clone());
             self.live.send(LiveCommand::Robot(Box::new(robot), controller));
         }
     }
 
     fn send_controller(&mut self) {
         if let Some((_, controller)) = self.robot_and_controller() {
-            self.link.set_controller(controller.clone());
+            self.link.set_design(controller.clone());
             self.live.send(LiveCommand::Controller(controller));
         }
     }

@@ -179,6 +179,14 @@ pub(crate) enum Command {
     /// Opens the session that the form of the robot page describes.
     Connect,
     Disconnect,
+    /// Applies the design to the connected robot, after a question if its gains change much.
+    ApplyGains,
+    /// The same without a question.
+    ConfirmGains,
+    /// Whether a driven robot gets new gains as they change.
+    FollowGains(bool),
+    /// Stops the robot and closes the window.
+    StopAndQuit,
     /// To the session with the robot.
     Order(SessionOrder),
     /// Chooses a recording to replay.

@@ -9,6 +9,8 @@ use egui::{
     UiBuilder, Visuals, vec2,
 };
 
+use flqr_core::message;
+
 use crate::theme::palette;
 use crate::widgets::hint_ui;
 
@@ -109,7 +111,7 @@ impl Default for Messages {
 
 impl Messages {
     pub(crate) fn add(&mut self, severity: Severity, text: impl Into<String>) {
-        let (time, text) = (self.start.elapsed(), text.into());
+        let (time, text) = (self.start.elapsed(), message::shown(&text.into()));
         match self.all.back_mut() {
             Some(last) if last.text == text && last.severity == severity => {
                 last.time = time;

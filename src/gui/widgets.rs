@@ -1,6 +1,7 @@
 //! Small pieces that every tab uses: section heads, messages, number fields, number text.
 
-use egui::{Color32, DragValue, Response, RichText, Ui, WidgetText, vec2};
+use egui::emath::Numeric;
+use egui::{Color32, DragValue, Event, Key, Response, RichText, Ui, WidgetText, vec2};
 
 use crate::theme::palette;
 
@@ -47,16 +48,65 @@ pub(crate) fn warning_ui(ui: &mut Ui, text: impl Into<String>) -> Response {
     ui.add(egui::Label::new(RichText::new(text).small().color(color)).wrap())
 }
 
-/// A number field that holds any magnitude: a drag changes it in proportion, typing sets it.
+/// Adds a number field that holds any magnitude: a drag changes it in proportion, typing sets it. It shows four digits,
+/// and all of them while it is edited.
 pub(crate) fn number_ui(ui: &mut Ui, value: &mut f64, name: &str, width: f32) -> Response {
     let speed = (0.01 * value.abs()).max(1e-6);
-    let field = DragValue::new(value)
-        .speed(speed)
-        .update_while_editing(false)
-        .min_size(egui::vec2(width, 0.0))
-        .custom_formatter(|value, _| plain(value, 4))
-        .custom_parser(parse);
-    ui.add(field).accessible_name(name)
+    let id = ui.next_auto_id();
+    // A field that gets the focus by Tab gets it here.
+    let editing = ui.is_enabled()
+        && ui.memory_mut(|memory| {
+            memory.interested_in_focus(id, ui.layer_id());
+            memory.has_focus(id)
+        });
+    entry_ui(ui, value, name, |field| {
+        field
+            .speed(speed)
+            .min_size(egui::vec2(width, 0.0))
+            .custom_formatter(move |value, _| if editing { exact(value) } else { plain(value, 4) })
+            .custom_parser(parse)
+    })
+}
+
+/// Adds a number field as `adapt` makes it. Only what is dragged, or typed and then confirmed or left, changes the value:
+/// entering and leaving it does not, and Esc discards what was typed.
+pub(crate) fn entry_ui<T: Numeric>(
+    ui: &mut Ui,
+    value: &mut T,
+    name: &str,
+    adapt: impl for<'a> FnOnce(DragValue<'a>) -> DragValue<'a>,
+) -> Response {
+    let before = *value;
+    let field = adapt(DragValue::new(value).update_while_editing(false).clip_text(true));
+    let response = ui.add(field).accessible_name(name);
+    let is_discarded = is_escaped(ui, &response) && !response.dragged();
+    // A whole number beyond 2^53 loses digits as the field reads it.
+    if is_discarded || value.to_f64() == before.to_f64() {
+        *value = before;
+    }
+    response
+}
+
+/// Whether a field was left with Esc just now: it takes over what was typed up to two passes after it is left.
+fn is_escaped(ui: &Ui, response: &Response) -> bool {
+    let (now, key) = (ui.ctx().cumulative_pass_nr(), response.id.with("escaped"));
+    if response.lost_focus() && escape_pressed(ui) {
+        ui.data_mut(|data| data.insert_temp(key, now));
+    }
+    let escaped: Option<u64> = ui.data(|data| data.get_temp(key));
+    escaped.is_some_and(|pass| now - pass <= 2)
+}
+
+/// Whether Esc was pressed in this frame, even if the press was taken away to stop the robot.
+fn escape_pressed(ui: &Ui) -> bool {
+    let is_escape = |event: &Event| matches!(event, Event::Key { key: Key::Escape, pressed: true, .. });
+    ui.input(|input| input.raw.events.iter().any(is_escape))
+}
+
+/// A number with all of its digits: parsed again, it is the same to the last bit.
+fn exact(value: f64) -> String {
+    let is_handy = value == 0.0 || (1e-5..1e16).contains(&value.abs());
+    if is_handy { value.to_string() } else { format!("{value:e}") }
 }
 
 /// Reads a number as people type it: surrounding spaces, a typographic minus, a decimal comma.
@@ -147,6 +197,14 @@ mod tests {
         assert_eq!(shown(-12.3456, 4), "−12.35");
         assert_eq!(shown(0.0, 3), "0.00");
         assert_eq!(shown(2.1e-15, 2), "2.1e−15");
+    }
+
+    #[test]
+    fn exact_text_is_read_back_to_the_last_bit() {
+        for value in [0.0, 2.0, 0.1, 1.0 / 3.0, 0.5_f64.sqrt(), -4.9e-4, 1e-300, 1.8e30, f64::MIN_POSITIVE] {
+            assert_eq!(parse(&exact(value)), Some(value), "{}", exact(value));
+        }
+        assert_eq!(exact(60.0), "60");
     }
 
     #[test]

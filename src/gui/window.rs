@@ -41,6 +41,8 @@ pub struct WindowOptions {
     pub session: Option<PathBuf>,
     /// Folder where the running session is kept; without one it is not kept.
     pub state_folder: Option<PathBuf>,
+    /// What has to be said at the start.
+    pub warning: Option<String>,
     /// Whether the tour may begin, if it was never seen.
     pub tour: bool,
 }
@@ -62,6 +64,7 @@ impl WindowOptions {
             recent_file: crate::recent::default_file(),
             session: None,
             state_folder: None,
+            warning: None,
             tour: false,
         }
     }

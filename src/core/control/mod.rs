@@ -7,6 +7,7 @@
 
 mod balance;
 pub mod drive;
+pub mod gate;
 mod odometry;
 mod program;
 mod schedule;
@@ -18,7 +19,7 @@ pub use odometry::{Measurement, Odometry, Readings};
 pub use program::{SpeedProgram, SpeedRun};
 pub use schedule::{GainSchedule, ScheduleError, ScheduleNode};
 pub use speed::{SpeedGains, SpeedPi, SpeedPiState};
-pub use yaw::default_yaw_hold;
+pub use yaw::{default_yaw_hold, yaw_inertia_kg_m2};
 
 #[cfg(test)]
 mod tests;

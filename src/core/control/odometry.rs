@@ -46,13 +46,17 @@ impl Odometry {
         Self { wheel_radius_m: robot.parameters.wheel_radius_m, track_width_m: robot.chassis.track_width_m }
     }
 
+    /// Heading of the motor angles, or yaw rate of the motor speeds.
+    pub fn yaw(&self, [left, right]: [f64; 2]) -> f64 {
+        self.wheel_radius_m * (right - left) / self.track_width_m
+    }
+
     /// x = r (q + θ) of the wheels' mean q, ψ = r (q_r − q_l)/track of their difference, and the same of
     /// the speeds.
     pub fn measurement(&self, readings: &Readings) -> Measurement {
         let &Readings { motor_angle_rad, motor_speed_rad_s, pitch_rad, pitch_rate_rad_s } = readings;
         let radius = self.wheel_radius_m;
         let mean = |[left, right]: [f64; 2]| f64::midpoint(left, right);
-        let turned = |[left, right]: [f64; 2]| radius * (right - left) / self.track_width_m;
         let state = State {
             x_m: radius * (mean(motor_angle_rad) + pitch_rad),
             x_dot_m_s: radius * (mean(motor_speed_rad_s) + pitch_rate_rad_s),
@@ -63,8 +67,8 @@ impl Odometry {
             state,
             motor_angle_rad,
             motor_speed_rad_s,
-            yaw_rad: turned(motor_angle_rad),
-            yaw_rate_rad_s: turned(motor_speed_rad_s),
+            yaw_rad: self.yaw(motor_angle_rad),
+            yaw_rate_rad_s: self.yaw(motor_speed_rad_s),
         }
     }
 }

@@ -13,11 +13,16 @@ const DAMPING_RATIO: f64 = 1.0;
 /// frequency of 10 rad/s and critical damping; I_ψ = body + 2 (m + I/r²)(track/2)², wheels included.
 pub fn default_yaw_hold(parameters: &RobotParameters, chassis: &Chassis) -> YawHold {
     let (radius, track) = (parameters.wheel_radius_m, chassis.track_width_m);
-    let rolling_mass_kg = parameters.wheel_mass_kg + parameters.wheel_inertia_kg_m2 / (radius * radius);
-    let inertia = chassis.yaw_inertia_kg_m2 + 0.5 * rolling_mass_kg * track * track;
-    let torque_per_acceleration = inertia * radius / track;
+    let torque_per_acceleration = yaw_inertia_kg_m2(parameters, chassis) * radius / track;
     YawHold {
         stiffness_nm_rad: torque_per_acceleration * NATURAL_FREQUENCY_RAD_S * NATURAL_FREQUENCY_RAD_S,
         damping_nm_s_rad: torque_per_acceleration * 2.0 * DAMPING_RATIO * NATURAL_FREQUENCY_RAD_S,
     }
+}
+
+/// Inertia of the turning robot about the vertical, rolling wheels included, kg m².
+pub fn yaw_inertia_kg_m2(parameters: &RobotParameters, chassis: &Chassis) -> f64 {
+    let (radius, track) = (parameters.wheel_radius_m, chassis.track_width_m);
+    let rolling_mass_kg = parameters.wheel_mass_kg + parameters.wheel_inertia_kg_m2 / (radius * radius);
+    chassis.yaw_inertia_kg_m2 + 0.5 * rolling_mass_kg * track * track
 }

@@ -32,14 +32,19 @@ impl Lateness {
 
     /// As a session shows it.
     pub fn timing(&self) -> Timing {
-        Timing {
-            ticks: self.ticks,
-            median_s: self.quantile_s(0.5),
-            p99_s: self.quantile_s(0.99),
-            greatest_s: self.greatest.as_secs_f64(),
-            skipped: self.skipped,
-            histogram: self.histogram(),
-        }
+        let mut timing = Timing::default();
+        self.fill(&mut timing);
+        timing
+    }
+
+    /// The same in memory that is there.
+    pub(super) fn fill(&self, timing: &mut Timing) {
+        timing.ticks = self.ticks;
+        timing.median_s = self.quantile_s(0.5);
+        timing.p99_s = self.quantile_s(0.99);
+        timing.greatest_s = self.greatest.as_secs_f64();
+        timing.skipped = self.skipped;
+        self.fill_histogram(&mut timing.histogram);
     }
 
     /// Lateness that `share` of the ticks do not exceed, s, rounded up to the edge of its bin.
@@ -55,13 +60,13 @@ impl Lateness {
         0.0
     }
 
-    fn histogram(&self) -> Vec<u64> {
-        let mut shown = vec![0; Timing::EDGES_S.len() + 1];
+    fn fill_histogram(&self, shown: &mut Vec<u64>) {
+        shown.clear();
+        shown.resize(Timing::EDGES_S.len() + 1, 0);
         for (index, count) in self.bins.iter().enumerate().filter(|(_, count)| **count > 0) {
             let middle_s = 0.5e-9 * (lower_edge_ns(index) + upper_edge_ns(index));
             shown[Timing::EDGES_S.partition_point(|edge| *edge < middle_s)] += count;
         }
-        shown
     }
 }
 

@@ -20,10 +20,12 @@ mod pty;
 mod pty_tests;
 mod reconnect;
 mod recorder;
+mod replace_file;
 mod retry;
 mod serial;
 mod session;
 mod slcan;
+mod stop;
 mod timing;
 
 pub use bus_health::{BusHealth, BusState};
@@ -39,9 +41,11 @@ pub use open::{BusPair, open_bus};
 pub use open_error::OpenError;
 pub use pacer::{Pacer, Priority, Tick, hurry};
 pub use recorder::{Recorder, RecorderError, RecorderInput};
+pub use replace_file::{abandon_replacements, check_replaceable, real_path, replace_file};
 pub use session::{
-    Connection, Counters, Described, DriveStatus, Event, EventKind, FileError, ImuStatus, MotorStatus,
-    RecordingStatus, SerialAddress, SerialAddressError, Session, SessionError, SessionMode, SessionOptions,
-    SessionOrder, Source, SourceError, Status, Timing, Update, Waker,
+    Connection, Counters, Described, DriveStatus, Ending, Event, EventKind, FileError, ImuStatus,
+    MotorStatus, RecordingStatus, SerialAddress, SerialAddressError, Session, SessionError, SessionMode,
+    SessionOptions, SessionOrder, Source, SourceError, Status, Timing, Update, Waker,
 };
+pub use stop::{all_stopped, stop_all};
 pub use timing::{LatenessSummary, TimingComparison, TimingError, TimingPlan, compare_timing};

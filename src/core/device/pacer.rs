@@ -55,6 +55,11 @@ impl Pacer {
         self.lateness.timing()
     }
 
+    /// The same in memory that is there.
+    pub(super) fn fill_timing(&self, timing: &mut Timing) {
+        self.lateness.fill(timing);
+    }
+
     /// The tick that comes at `now`, which is not before its deadline.
     fn due(&mut self, now: Duration) -> Tick {
         let due = self.next;
@@ -87,6 +92,21 @@ pub fn hurry() -> Priority {
         (Err(reason), Err(slack)) => Priority::Usual(format!("{reason}; the timer's slack stays: {slack}")),
     }
 }
+
+/// Keeps the program's memory in place, so that no thread of a driven robot waits for a page of it, where the system
+/// allows it. Without a limit it is kept in place from then on too; with one, a later allocation might fail for it.
+#[cfg(target_os = "linux")]
+pub(super) fn lock_memory() {
+    use nix::sys::mman::{MlockAllFlags, mlockall};
+    use nix::sys::resource::{RLIM_INFINITY, Resource, getrlimit};
+    let is_unlimited = getrlimit(Resource::RLIMIT_MEMLOCK).is_ok_and(|(soft, _)| soft == RLIM_INFINITY);
+    let later = if is_unlimited { MlockAllFlags::MCL_FUTURE } else { MlockAllFlags::empty() };
+    // What is not allowed is no reason not to drive.
+    mlockall(MlockAllFlags::MCL_CURRENT | later).unwrap_or(());
+}
+
+#[cfg(not(target_os = "linux"))]
+pub(super) fn lock_memory() {}
 
 #[cfg(target_os = "linux")]
 fn real_time() -> Result<(), String> {

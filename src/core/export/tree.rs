@@ -3,6 +3,7 @@
 use serde_json::Value;
 
 use super::Controller;
+use crate::record::text_cell;
 
 pub(super) fn json(controller: &Controller) -> String {
     let mut text =
@@ -65,7 +66,9 @@ fn write_csv(value: &Value, path: &str, text: &mut String) {
                 .enumerate()
                 .for_each(|(index, inner)| write_csv(inner, &join(&index.to_string()), text));
         }
-        Value::String(string) => text.push_str(&format!("{path},\"{}\"\n", string.replace('"', "\"\""))),
+        Value::String(string) => {
+            text.push_str(&format!("{path},\"{}\"\n", text_cell(string).replace('"', "\"\"")));
+        }
         leaf => text.push_str(&format!("{path},{leaf}\n")),
     }
 }
@@ -89,6 +92,16 @@ mod tests {
         let text = yaml(&controller());
         assert!(text.contains("gain:\n  left: [-0.25, 1.0e-9, -0.25, -0.25]\n"), "{text}");
         assert!(text.starts_with("name: \"a \\\"quoted\\\" name\"\n"), "{text}");
+    }
+
+    #[test]
+    fn no_cell_of_csv_is_a_formula() {
+        let named = |name: &str| csv(&Controller { name: name.to_owned(), ..controller() });
+        for (name, cell) in [("=1+1", "\"'=1+1\""), ("@SUM(A1)", "\"'@SUM(A1)\""), ("a=b", "\"a=b\"")] {
+            let text = named(name);
+            assert!(text.starts_with(&format!("key,value\nname,{cell}\n")), "{text}");
+            assert!(text.contains("\ngain.left.0,-0.25\n"), "numbers stay numbers: {text}");
+        }
     }
 
     #[test]

@@ -185,12 +185,9 @@ fn sources(logs: &[Log]) -> String {
 fn findings(log: &Log, content: &Content) -> Vec<HealthFinding> {
     let mut findings = data_health(log);
     if let Content::Pairs(set) = content {
-        findings.extend(set.warnings.iter().map(|problem| HealthFinding {
-            severity: Severity::Info,
-            column: "motor_speed_rad_s".to_owned(),
-            problem: problem.clone(),
-            mend: "hold each speed longer and steadier".to_owned(),
-        }));
+        let mend = "hold each speed longer and steadier";
+        let finding = |problem| HealthFinding::new(Severity::Info, "motor_speed_rad_s", problem, mend);
+        findings.extend(set.warnings.iter().map(finding));
     }
     findings
 }

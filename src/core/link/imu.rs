@@ -17,6 +17,8 @@ pub struct ImuReading {
     /// Pitch that the direction of the measured acceleration gives, rad; none of an IMU that sends no
     /// acceleration.
     pub tilt_rad: Option<f64>,
+    /// Yaw rate, left positive, rad/s; none of a robot whose pitch is described by a DBC file.
+    pub yaw_rate_rad_s: Option<f64>,
     /// Temperature, °C, if it is sent.
     pub temperature_c: Option<f64>,
 }
@@ -40,6 +42,7 @@ pub struct ImuAssembler {
 struct Rate {
     time: Duration,
     pitch_rate_rad_s: f64,
+    yaw_rate_rad_s: f64,
 }
 
 impl ImuAssembler {
@@ -72,7 +75,8 @@ impl ImuAssembler {
             }
             Reading::Rate { rate_rad_s, .. } => {
                 let pitch_rate_rad_s = self.sign * self.about_axis(rate_rad_s);
-                self.rate = Some(Rate { time, pitch_rate_rad_s });
+                // The IMU's z axis points up.
+                self.rate = Some(Rate { time, pitch_rate_rad_s, yaw_rate_rad_s: rate_rad_s[2] });
                 None
             }
             Reading::Angle { angle_rad, .. } => self.complete(time, self.sign * self.about_axis(angle_rad)),
@@ -95,6 +99,7 @@ impl ImuAssembler {
             pitch_rad,
             pitch_rate_rad_s: rate.pitch_rate_rad_s,
             tilt_rad: self.tilt_rad,
+            yaw_rate_rad_s: Some(rate.yaw_rate_rad_s),
             temperature_c: self.temperature_c,
         })
     }
@@ -150,6 +155,7 @@ mod tests {
             assert!((reading.pitch_rad - expected.0).abs() < 5e-5, "{reading:?}");
             assert!((reading.pitch_rate_rad_s - expected.1).abs() < 6e-4, "{reading:?}");
             assert!((reading.tilt_rad.unwrap() - expected.0).abs() < 5e-4, "{reading:?}");
+            assert!((reading.yaw_rate_rad_s.unwrap() - 3.0).abs() < 6e-4, "{reading:?}");
         }
     }
 

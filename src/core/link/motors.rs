@@ -52,6 +52,8 @@ pub struct MotorHealth {
     pub on: Option<bool>,
     /// What is wrong with it.
     pub errors: MotorErrors,
+    /// Time from the query, if this program sent it, to this reply.
+    pub round_trip: Option<Duration>,
 }
 
 /// Error bits of a motor.
@@ -110,14 +112,16 @@ pub enum MotorEvent {
         /// Command byte.
         command: u8,
     },
-    /// Another controller on the bus has asked it for a torque current, A.
-    Asked {
+    /// A command to it that is no query and that this program did not send: another controller is on the bus.
+    Commanded {
         /// Which.
         motor: Motor,
         /// When.
         time: Duration,
-        /// Asked for, A, forward positive.
-        current_a: f64,
+        /// Command byte, or the identifier 0x280 of the frame with the torque currents of all motors.
+        command: u16,
+        /// Torque current of a torque command, A, forward positive.
+        current_a: Option<f64>,
     },
     /// It was silent for so long that its turns in between are not known: the angle of the reading that follows
     /// starts from the last one that was known.

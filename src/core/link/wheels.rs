@@ -1,9 +1,10 @@
 //! The two wheel motors on the bus: orders to frames, frames to what was heard, with the settings of the robot.
 
+use std::collections::VecDeque;
 use std::f64::consts::TAU;
 use std::time::Duration;
 
-use super::lk::{self, Address, Command, MAX_IQ, MotorId, Reply, State1, State2};
+use super::lk::{self, Address, Command, MAX_IQ, MotorId, Reply, State1, State2, TORQUES_ID};
 use super::{Direction, Frame, MotorEvent, MotorHealth, MotorOrder, MotorState, StampedFrame};
 use crate::robot::{LinkSettings, Motor, TorqueCommand};
 
@@ -13,6 +14,9 @@ pub const LONGEST_SILENCE: Duration = Duration::from_millis(60);
 
 /// A reply that comes later than this after its command is not taken for its reply.
 const LATEST_REPLY: Duration = Duration::from_millis(50);
+
+/// Most commands that are remembered for their echoes: those of 50 ms, and some.
+const MOST_SENT: usize = 128;
 
 /// How far two readings of a motor's temperature may be apart, °C.
 const TEMPERATURE_STEP_C: i16 = 2;
@@ -30,6 +34,16 @@ const RAD_S_PER_DPS: f64 = TAU / 360.0;
 /// replies are plain echoes, are taken for acknowledged by a repetition of the command after a lost reply; and a
 /// torque command to a motor at 0 °C after a lost reply can be taken for a reading of encoder 0. Neither can
 /// happen once a motor has answered on 0x180 + number, which no command has.
+///
+/// # Commands of another controller
+/// Every command that this program did not send is one, but for three kinds of frames:
+/// - echoes: some adapters return what they send. An echo has the bytes of a command sent within 50 ms, and each
+///   command has one. Queries show it: no reply has their bytes. Until an echoed query is heard, a command that
+///   moves a motor is another controller's even if it has the bytes of one of ours;
+/// - the reply to an on or off command that comes twice;
+/// - replies with a damaged command byte, which CAN's checksum rules out but a serial line does not: one bit off the
+///   reply to an on or off command, or off any reply if it reads as access to parameters, which may have any bytes.
+///   A damaged reply with the bytes of another command takes more than one wrong bit.
 #[derive(Clone, Debug)]
 pub struct Wheels {
     settings: LinkSettings,
@@ -47,6 +61,12 @@ struct Wheel {
     answers_apart: bool,
     /// The newest command of each code.
     unanswered: Vec<Unanswered>,
+    /// Commands that this program sent within the time of a reply and whose echo was not heard, oldest first.
+    sent: VecDeque<Sent>,
+    /// Whether commands of this program come back.
+    echoes: bool,
+    /// Whether a frame before the first reply was left out, because it may have been an echo.
+    left_one_out: bool,
     temperature_c: Option<i8>,
     shaft: Option<Shaft>,
 }
@@ -56,6 +76,12 @@ struct Unanswered {
     code: u8,
     time: Duration,
     ours: bool,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Sent {
+    bytes: [u8; 8],
+    time: Duration,
 }
 
 /// Encoder steps in the motor's own sense.
@@ -78,6 +104,9 @@ impl Wheels {
             sign: settings.directions()[motor as usize].sign(),
             answers_apart: false,
             unanswered: Vec::new(),
+            sent: VecDeque::new(),
+            echoes: false,
+            left_one_out: false,
             temperature_c: None,
             shaft: None,
         };
@@ -142,23 +171,38 @@ impl Wheels {
         let (time, ours) = (stamped.time, stamped.direction == Direction::Sent);
         let tells = !ours || self.tells_sent;
         let (Address::CommandOrReply(id) | Address::Reply(id)) = address else {
-            return Some(self.asked_together(bytes, time, ours).map(|event| event.filter(|_| tells)));
+            return Some(self.commanded_together(bytes, time, ours).map(|event| event.filter(|_| tells)));
         };
         let wheel = self.wheels.iter_mut().find(|wheel| wheel.id == Some(id))?;
         wheel.answers_apart |= matches!(address, Address::Reply(_));
-        if ours || (address == Address::CommandOrReply(id) && wheel.is_command(bytes, time)) {
-            return Some([wheel.asked(bytes, time, ours, &self.settings).filter(|_| tells), None]);
+        let on_command_id = address == Address::CommandOrReply(id);
+        if !ours && on_command_id && wheel.is_echo(bytes, time) {
+            return None;
         }
-        wheel.unanswered.retain(|asked| asked.code != bytes[0]);
-        wheel.answered(Reply::decode(bytes, self.settings.state_layout)?, time, &self.settings)
+        if ours || (on_command_id && wheel.is_command(bytes, time)) {
+            if !ours && wheel.is_own_reply(bytes) {
+                return None;
+            }
+            let command = u16::from(bytes[0]);
+            let event = wheel.commanded(bytes, command, time, ours, &self.settings);
+            return Some([event.filter(|_| tells), None]);
+        }
+        let asked = wheel.unanswered.iter().position(|asked| asked.code == bytes[0]);
+        let asked = asked.map(|index| wheel.unanswered.remove(index)).filter(|asked| asked.ours);
+        let round_trip = asked.map(|asked| time.saturating_sub(asked.time));
+        wheel.answered(Reply::decode(bytes, self.settings.state_layout)?, time, round_trip, &self.settings)
     }
 
-    fn asked_together(&mut self, bytes: [u8; 8], time: Duration, ours: bool) -> [Option<MotorEvent>; 2] {
+    fn commanded_together(&mut self, bytes: [u8; 8], time: Duration, ours: bool) -> [Option<MotorEvent>; 2] {
         let slots = lk::torques(bytes);
         let settings = &self.settings;
         self.wheels.each_mut().map(|wheel| {
             let iq = *slots.get(usize::from(wheel.id?.number()) - 1)?;
-            wheel.asked(Command::TorqueCurrent { iq }.encode(), time, ours, settings)
+            let alone = Command::TorqueCurrent { iq }.encode();
+            if !ours && wheel.is_echo(alone, time) {
+                return None;
+            }
+            wheel.commanded(alone, TORQUES_ID.raw() as u16, time, ours, settings)
         })
     }
 }
@@ -184,21 +228,61 @@ impl Wheel {
         }
     }
 
-    fn asked(
+    /// Whether a frame is a command of this program that its adapter returns.
+    fn is_echo(&mut self, bytes: [u8; 8], time: Duration) -> bool {
+        while self.sent.front().is_some_and(|sent| sent.time + LATEST_REPLY < time) {
+            self.sent.pop_front();
+        }
+        let Some(index) = self.sent.iter().position(|sent| sent.bytes == bytes) else { return false };
+        let is_query = Command::decode(bytes).is_some_and(|command| command.is_query());
+        if is_query && self.temperature_c.is_none() && !self.left_one_out {
+            // Nothing tells an echo from a reply of zeros yet, and one reply can be spared.
+            self.left_one_out = true;
+            self.sent.remove(index);
+            return true;
+        }
+        // A motor at 0 °C and encoder 0 may answer with the bytes of the query.
+        self.echoes |= is_query && self.is_command(bytes, time);
+        if self.echoes {
+            self.sent.remove(index);
+        }
+        self.echoes
+    }
+
+    /// Whether a frame that reads as a command is a reply to one of this program that came twice or was damaged.
+    fn is_own_reply(&self, bytes: [u8; 8]) -> bool {
+        let of_parameters = matches!(Command::decode(bytes), Some(Command::Parameters { .. }));
+        self.sent.iter().any(|sent| {
+            let wrong_bits = (sent.bytes[0] ^ bytes[0]).count_ones();
+            let same_rest = sent.bytes[1..] == bytes[1..];
+            let is_switching = matches!(sent.bytes[0], 0x80 | 0x88);
+            (is_switching && wrong_bits <= 1 && same_rest) || (of_parameters && wrong_bits == 1)
+        })
+    }
+
+    fn commanded(
         &mut self,
         bytes: [u8; 8],
+        command: u16,
         time: Duration,
         ours: bool,
         settings: &LinkSettings,
     ) -> Option<MotorEvent> {
-        self.unanswered.retain(|asked| asked.code != bytes[0]);
-        self.unanswered.push(Unanswered { code: bytes[0], time, ours });
-        match Command::decode(bytes)? {
-            Command::TorqueCurrent { iq } => {
-                Some(MotorEvent::Asked { motor: self.motor, time, current_a: self.current_a(iq, settings) })
+        let code = bytes[0];
+        self.unanswered.retain(|asked| asked.code != code);
+        self.unanswered.push(Unanswered { code, time, ours });
+        if ours {
+            if self.sent.len() == MOST_SENT {
+                self.sent.pop_front();
             }
-            _ => None,
+            self.sent.push_back(Sent { bytes, time });
         }
+        let current_a = match Command::decode(bytes)? {
+            Command::TorqueCurrent { iq } => Some(self.current_a(iq, settings)),
+            query if query.is_query() => return None,
+            _ => None,
+        };
+        Some(MotorEvent::Commanded { motor: self.motor, time, command, current_a })
     }
 
     fn current_a(&self, iq: i16, settings: &LinkSettings) -> f64 {
@@ -209,13 +293,14 @@ impl Wheel {
         &mut self,
         reply: Reply,
         time: Duration,
+        round_trip: Option<Duration>,
         settings: &LinkSettings,
     ) -> Option<[Option<MotorEvent>; 2]> {
         let motor = self.motor;
         match reply {
             Reply::State2 { state, .. } => Some(self.moved(state, time, settings)),
             Reply::State1 { state, .. } => {
-                Some([Some(MotorEvent::Health(motor, health(&state, time))), None])
+                Some([Some(MotorEvent::Health(motor, health(&state, time, round_trip))), None])
             }
             Reply::Echo { bytes: [command, ..] } | Reply::Offset { command, .. } => {
                 Some([Some(MotorEvent::Acknowledged { motor, time, command }), None])
@@ -261,7 +346,7 @@ impl Shaft {
     }
 }
 
-fn health(state: &State1, time: Duration) -> MotorHealth {
+fn health(state: &State1, time: Duration, round_trip: Option<Duration>) -> MotorHealth {
     MotorHealth {
         time,
         temperature_c: state.temperature_c(),
@@ -269,6 +354,7 @@ fn health(state: &State1, time: Duration) -> MotorHealth {
         supply_current_a: state.supply_current_a(),
         on: state.on(),
         errors: state.errors(),
+        round_trip,
     }
 }
 

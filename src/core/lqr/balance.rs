@@ -25,8 +25,9 @@ pub(super) fn units<M: Square>(equation: &Riccati<M>) -> Vec<f64> {
             }
             // One unit larger by 2ᵉ: input sizes shrink and output sizes grow by that factor.
             let exponent = (0.5 * (input / output).log2()).round() as i32;
-            let bounded =
-                exponents[state].saturating_add(exponent).clamp(-LARGEST_EXPONENT, LARGEST_EXPONENT);
+            // Of sizes that have overflowed or underflowed.
+            let exponent = exponent.clamp(-2 * LARGEST_EXPONENT, 2 * LARGEST_EXPONENT);
+            let bounded = (exponents[state] + exponent).clamp(-LARGEST_EXPONENT, LARGEST_EXPONENT);
             if exponent.abs() >= WORTHWHILE && bounded != exponents[state] {
                 exponents[state] = bounded;
                 changed = true;

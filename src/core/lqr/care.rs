@@ -89,26 +89,89 @@ pub fn solve_care(a: &DMatrix<f64>, q: &DMatrix<f64>, input: CareInput) -> Resul
         check_finite(name, matrix)?;
     }
     check_symmetric("q", q)?;
+    let extreme = extreme_entry(a, q, input);
     let input = Input::new(n, input)?;
+    if input.g.entries().iter().any(|entry| !entry.is_finite()) {
+        return Err(extreme.map_or(CareError::OutOfRange, Extreme::error));
+    }
     let equation = Riccati { a: from_dmatrix(a), g: input.g, q: from_dmatrix(q).symmetric_part() };
     let units = units(&equation);
     let balanced = equation.in_units(&units);
     let Some(found) = find(&balanced) else {
-        return Err(cause(&balanced));
+        let extreme = extreme.filter(|entry| entry.is_beyond_products() || has_large_entries(&balanced));
+        return Err(extreme.map_or_else(|| cause(&balanced), Extreme::error));
     };
     let exact = scaled(&found.p, |i, j| 1.0 / (units[i] * units[j]));
     let p = exact.map(Real::to_f64);
-    if !p.norm().is_finite() {
-        return Err(CareError::OutOfRange);
-    }
     let rounded: SquareN<DoubleDouble> = p.map(Real::from_f64);
-    Ok(CareSolution {
+    let solution = CareSolution {
         gain: input.weighted.map(|weighted| weighted.gain(&exact)),
         poles: found.poles,
         relative_residual: relative(equation.residual(&rounded).norm(), p.norm()),
         warnings: found.warnings,
         p: DMatrix::from_row_slice(n, n, p.entries()),
-    })
+    };
+    if solution.is_finite() && p.norm().is_finite() { Ok(solution) } else { Err(CareError::OutOfRange) }
+}
+
+impl CareSolution {
+    fn is_finite(&self) -> bool {
+        let gain = self.gain.iter().flat_map(DMatrix::iter);
+        let poles = self.poles.iter().flat_map(|pole| [&pole.re, &pole.im]);
+        self.p
+            .iter()
+            .chain(gain)
+            .chain(poles)
+            .chain([&self.relative_residual])
+            .all(|number| number.is_finite())
+    }
+}
+
+/// Largest entry of a balanced equation of which products of three, squared for their norms, are in the range of doubles.
+const LARGEST_ENTRY: f64 = 1e50;
+
+/// Decimal exponent of an entry beyond which such products leave that range.
+const LARGEST_EXPONENT: f64 = 100.0;
+
+fn has_large_entries(equation: &Riccati<SquareN<DoubleDouble>>) -> bool {
+    let mut entries = [&equation.a, &equation.g, &equation.q].into_iter().flat_map(Square::entries);
+    // Also where an entry is not a number.
+    !entries.all(|entry| entry.abs().to_f64() <= LARGEST_ENTRY)
+}
+
+/// An entry of a matrix as the user gave it.
+#[derive(Clone, Copy)]
+struct Extreme {
+    matrix: &'static str,
+    value: f64,
+}
+
+impl Extreme {
+    fn exponent(self) -> f64 {
+        self.value.abs().log10().abs()
+    }
+
+    fn is_beyond_products(self) -> bool {
+        self.exponent() > LARGEST_EXPONENT
+    }
+
+    fn error(self) -> CareError {
+        CareError::TooFarApart { matrix: self.matrix, value: self.value }
+    }
+}
+
+/// The entry that is farthest from 1; none where all are zero.
+fn extreme_entry(a: &DMatrix<f64>, q: &DMatrix<f64>, input: CareInput) -> Option<Extreme> {
+    let of_input = match input {
+        CareInput::Weighted { b, r } => [("b", b), ("r", r)],
+        CareInput::Quadratic { g } => [("g", g), ("g", g)],
+    };
+    let matrices = [("a", a), ("q", q)].into_iter().chain(of_input);
+    let entries =
+        matrices.flat_map(|(matrix, entries)| entries.iter().map(move |&value| Extreme { matrix, value }));
+    entries
+        .filter(|entry| entry.value != 0.0)
+        .max_by(|one, other| one.exponent().total_cmp(&other.exponent()))
 }
 
 /// `residual` over `size`, or as it is where P is zero.

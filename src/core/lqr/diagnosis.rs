@@ -52,6 +52,8 @@ pub(super) fn cause<T: Real>(equation: &Riccati<SquareN<T>>) -> CareError {
 /// The mode of `a` (v with a v = λ v, Re λ ≥ 0 to rounding) that `rows` sees least, where rows·v ≈ 0.
 pub(super) fn lost_mode(a: &DMatrix<f64>, rows: &DMatrix<f64>) -> Option<LostMode> {
     let n = a.nrows();
+    // Norms of large entries would overflow.
+    let (unit, a, rows) = (a.amax(), of_largest_one(a), of_largest_one(rows));
     let mut modes = vec![Complex::default(); n];
     eigenvalues(SquareN::from_fn(n, |i, j| a[(i, j)]), &mut modes)?;
     let (size, weight) = (a.norm(), rows.norm());
@@ -69,11 +71,20 @@ pub(super) fn lost_mode(a: &DMatrix<f64>, rows: &DMatrix<f64>) -> Option<LostMod
             (value <= OUT_OF_REACH * size).then_some((value, LostMode { eigenvalue, direction }))
         })
         .min_by(|(one, _), (other, _)| one.total_cmp(other))
-        .map(|(_, mode)| mode)
+        .map(|(_, mode)| LostMode { eigenvalue: mode.eigenvalue * unit, ..mode })
+}
+
+/// The matrix over its largest entry.
+fn of_largest_one(matrix: &DMatrix<f64>) -> DMatrix<f64> {
+    let largest = matrix.amax();
+    if largest > 0.0 { matrix.map(|entry| entry / largest) } else { matrix.clone() }
 }
 
 /// Smallest singular value and its right vector.
 fn smallest_singular(matrix: DMatrix<Complex<f64>>) -> Option<(f64, DVector<Complex<f64>>)> {
+    if matrix.iter().any(|entry| !(entry.re.is_finite() && entry.im.is_finite())) {
+        return None;
+    }
     let svd = matrix.try_svd(false, true, f64::EPSILON, 10_000)?;
     let (index, value) = svd.singular_values.argmin();
     Some((value, svd.v_t?.row(index).adjoint()))

@@ -61,6 +61,17 @@ pub enum CareError {
         "no solution found: the equation is too ill-conditioned for 32 digits, so scale or reduce the model"
     )]
     IllConditioned,
+    /// Numbers so far apart that products of them leave the range of doubles.
+    #[error(
+        "matrix {matrix} has an entry of {value:.0e}, too far from the others for double precision: choose other units \
+         for the states, the inputs or the cost"
+    )]
+    TooFarApart {
+        /// The matrix with the most extreme entry.
+        matrix: &'static str,
+        /// That entry.
+        value: f64,
+    },
     /// P exists but does not fit a double.
     #[error("the solution is out of the range of doubles: choose other units for the states or the cost")]
     OutOfRange,

@@ -9,6 +9,7 @@ mod changes;
 mod effects_schema;
 mod entries;
 mod keep;
+mod plausibility;
 pub mod presets;
 mod refusal;
 mod robot_schema;
@@ -28,6 +29,7 @@ use crate::robot::{
 use axis_schema::AxisFile;
 pub use changes::Change;
 pub use entries::Entry;
+pub use plausibility::ModelWarning;
 use refusal::Refusal;
 use robot_schema::RobotFile;
 pub use tolerance::Tolerances;
@@ -126,7 +128,11 @@ impl RobotModel {
     pub fn at_leg_height(&self, leg_height_m: f64) -> Result<Self, ParameterError> {
         let Some(legs) = &self.legs else {
             let allowed = "left out, because com_height_m of this model is one number and not a table over leg_height_m";
-            return Err(ParameterError { name: "leg_height_m", value: leg_height_m, allowed });
+            return Err(ParameterError {
+                name: "leg_height_m",
+                value: leg_height_m,
+                allowed: allowed.into(),
+            });
         };
         let parameters = legs.at(leg_height_m, &self.parameters)?;
         Ok(Self { parameters, legs: Some(Legs { leg_height_m, ..legs.clone() }), ..self.clone() })

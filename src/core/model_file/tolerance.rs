@@ -83,7 +83,7 @@ impl Tolerances {
     pub fn set(&mut self, key: &str, share: f64) -> Result<(), ParameterError> {
         let Some(key) = keys(ALL).find(|name| *name == key) else {
             let allowed = "left out, because no number of a model file has this key";
-            return Err(ParameterError { name: "tolerance", value: share, allowed });
+            return Err(ParameterError { name: "tolerance", value: share, allowed: allowed.into() });
         };
         within(key, share, 0.0..=1.0, "a share from 0 to 1")?;
         match self.named.binary_search_by_key(&key, |(name, _)| *name) {

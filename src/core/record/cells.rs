@@ -4,6 +4,9 @@ use super::plan::{Need, Plan};
 use super::text::{Header, Row, for_each_cell};
 use super::{LineProblem, Log};
 
+/// Largest magnitude of a measured value: far above any in SI units, and its fourth power is a finite number.
+const LARGEST: f64 = 1e30;
+
 /// The numbers of one row, and what was wrong with the rows so far.
 pub(super) struct Cells {
     pub(super) plan: Plan,
@@ -49,7 +52,7 @@ impl Cells {
     pub(super) fn value(&self, column: usize) -> f64 {
         let target = &self.plan.targets[column];
         let value = self.row[target.from] * target.factor;
-        if value.is_finite() { value } else { f64::NAN }
+        if is_usable(value) { value } else { f64::NAN }
     }
 
     /// Reads the cells; false where the row is to be dropped.
@@ -64,11 +67,11 @@ impl Cells {
             };
             let need = plan.needs[index];
             *value = parse_number(cell).unwrap_or(f64::NAN);
-            if !value.is_finite() && is_damage(cell, *value, need) {
+            if !is_usable(*value) && is_damage(cell, *value, need) {
                 usable &= need != Need::Required;
                 problems.add(row.line, &header.names[index], || complaint(cell, need));
             }
-            if !value.is_finite() {
+            if !is_usable(*value) {
                 *value = f64::NAN;
             }
         });
@@ -91,15 +94,19 @@ impl Cells {
         let mut usable = true;
         for target in plan.targets.iter().filter(|target| target.factor != 1.0) {
             let (value, factor, need) = (row[target.from], target.factor, plan.needs[target.from]);
-            if value.is_finite() && !(value * factor).is_finite() && need != Need::Unknown {
+            if value.is_finite() && !is_usable(value * factor) && need != Need::Unknown {
                 usable &= need != Need::Required;
                 problems.add(line, &header.names[target.from], || {
-                    format!("{value:e} times {factor:e} is not a finite number, {}", outcome(need))
+                    format!("{value:e} times {factor:e} is too large for a measurement, {}", outcome(need))
                 });
             }
         }
         usable
     }
+}
+
+fn is_usable(value: f64) -> bool {
+    value.abs() <= LARGEST
 }
 
 fn parse_number(cell: &[u8]) -> Option<f64> {
@@ -111,7 +118,7 @@ fn parse_number(cell: &[u8]) -> Option<f64> {
 fn is_damage(cell: &[u8], value: f64, need: Need) -> bool {
     match need {
         Need::Unknown => false,
-        Need::Optional => !(cell.is_empty() || cell.eq_ignore_ascii_case(b"nan")) || value.is_infinite(),
+        Need::Optional => !(cell.is_empty() || cell.eq_ignore_ascii_case(b"nan")) || value.abs() > LARGEST,
         Need::Required => true,
     }
 }
@@ -122,6 +129,7 @@ fn complaint(cell: &[u8], need: Need) -> String {
     let what = match &*text {
         "" => "the cell is empty".to_owned(),
         text => match text.parse::<f64>() {
+            Ok(value) if value.is_finite() => format!("`{text}` is too large for a measurement"),
             Ok(_) => format!("`{text}` is not a finite number"),
             Err(_) if text.replacen(',', ".", 1).parse::<f64>().is_ok() => {
                 format!("`{text}` has a decimal comma where a point belongs")

@@ -9,6 +9,7 @@ mod units;
 use serde::Serialize;
 
 use super::{Log, LogError, LogKind, schema};
+use crate::message;
 
 /// How much a finding matters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -35,6 +36,14 @@ pub struct HealthFinding {
     pub mend: String,
 }
 
+impl HealthFinding {
+    /// A finding; its words, which may quote the file, are made fit to be shown.
+    pub fn new(severity: Severity, column: &str, problem: impl AsRef<str>, mend: impl AsRef<str>) -> Self {
+        let [problem, mend] = [problem.as_ref(), mend.as_ref()].map(message::shown);
+        Self { severity, column: column.to_owned(), problem, mend }
+    }
+}
+
 impl std::fmt::Display for HealthFinding {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self.severity {
@@ -59,20 +68,15 @@ const POSITIONS: [&str; 5] =
 struct Findings(Vec<HealthFinding>);
 
 impl Findings {
-    fn add(&mut self, severity: Severity, column: &str, problem: impl Into<String>, mend: impl Into<String>) {
-        self.0.push(HealthFinding {
-            severity,
-            column: column.to_owned(),
-            problem: problem.into(),
-            mend: mend.into(),
-        });
+    fn add(&mut self, severity: Severity, column: &str, problem: impl AsRef<str>, mend: impl AsRef<str>) {
+        self.0.push(HealthFinding::new(severity, column, problem, mend));
     }
 
-    fn info(&mut self, column: &str, problem: impl Into<String>) {
+    fn info(&mut self, column: &str, problem: impl AsRef<str>) {
         self.add(Severity::Info, column, problem, "");
     }
 
-    fn warn(&mut self, column: &str, problem: impl Into<String>, mend: impl Into<String>) {
+    fn warn(&mut self, column: &str, problem: impl AsRef<str>, mend: impl AsRef<str>) {
         self.add(Severity::Warning, column, problem, mend);
     }
 }

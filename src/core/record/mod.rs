@@ -5,7 +5,7 @@
 //! header has no comma, semicolons or tabs separate the cells.
 //!
 //! What happens with damaged input ([`read_log`]):
-//! - A row with too few or too many cells, or with a cell that is not a finite number in a required column,
+//! - A row with too few or too many cells, or with a cell that is not a finite number (of at most 1e30) in a required column,
 //!   is dropped; [`Log::problems`] names line and column. Consumers may rely on required columns being finite.
 //! - The same in an optional column of the schema leaves the row, with NaN as the value.
 //! - An empty cell of an optional column and any text in a column outside the schema is NaN without a problem.
@@ -43,7 +43,8 @@ pub use rows::{LogItem, LogRows};
 pub use sample::{BenchSample, Sample};
 pub use schema::LogKind;
 pub use time::row_time_s;
-pub use write::{LogWriter, write_log};
+pub(crate) use write::text_cell;
+pub use write::{LogWriter, is_written_log, write_log};
 
 /// One column of a log.
 #[derive(Clone, Debug, PartialEq)]

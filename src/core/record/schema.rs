@@ -47,6 +47,7 @@ pub const OPTIONAL: &[&str] = &[
     "motor_temperature_left_c",
     "motor_temperature_right_c",
     "bus_voltage_v",
+    "round_trip_s",
 ];
 
 impl LogKind {

@@ -1,20 +1,35 @@
 //! Writing logs.
 
+use std::borrow::Cow;
 use std::io::{self, Write};
 
 use super::Log;
 
-/// Writes a log as CSV, every number with the fewest digits that read back to the same number; an empty cell
-/// for NaN. [`super::read_log`] reads it back to the same columns.
+/// Line end of the last row of a log that flqr computed; all others end in LF. Readers of CSV take either, and nothing else
+/// writes both, so that such a log is told from a measured one of the same columns.
+const LAST_LINE_END: [u8; 2] = *b"\r\n";
+
+/// Writes a computed log as CSV, every number with the fewest digits that read back to the same number; an empty cell
+/// for NaN. [`super::read_log`] reads it back to the same columns, and [`is_written_log`] recognises it.
 ///
 /// # Errors
 /// What the writer reports.
-pub fn write_log(log: &Log, writer: impl Write) -> io::Result<()> {
-    let mut rows = LogWriter::new(writer, log.columns.iter().map(|column| &*column.name))?;
-    for row in 0..log.rows() {
-        rows.push(log.columns.iter().map(|column| column.values[row]))?;
-    }
-    rows.finish()
+pub fn write_log(log: &Log, mut writer: impl Write) -> io::Result<()> {
+    let row = |row: usize| log.columns.iter().map(move |column| column.values[row]);
+    let mut rows = LogWriter::new(&mut writer, log.columns.iter().map(|column| &*column.name))?;
+    let Some(last) = log.rows().checked_sub(1) else { return rows.finish() };
+    (0..last).try_for_each(|number| rows.push(row(number)))?;
+    rows.finish()?;
+    let csv = csv::WriterBuilder::new().terminator(csv::Terminator::CRLF).from_writer(writer);
+    let mut end = LogWriter { csv, cell: String::new() };
+    end.push(row(last))?;
+    end.finish()
+}
+
+/// Whether a file that begins and ends with these bytes was written by [`write_log`] and not changed since.
+pub fn is_written_log(opening: &[u8], ending: [u8; 2]) -> bool {
+    let header = opening.split(|&byte| byte == b'\n').next().unwrap_or_default();
+    ending == LAST_LINE_END && header.starts_with(b"time_s,") && !header.ends_with(b"\r")
 }
 
 /// Writes a log row by row, as [`write_log`] does, so that its length is no matter.
@@ -30,7 +45,10 @@ impl<W: Write> LogWriter<W> {
     /// What the writer reports.
     pub fn new<'n>(writer: W, names: impl Iterator<Item = &'n str>) -> io::Result<Self> {
         let mut csv = csv::Writer::from_writer(writer);
-        csv.write_record(names)?;
+        for name in names {
+            csv.write_field(&*text_cell(name))?;
+        }
+        csv.write_record(None::<&[u8]>)?;
         Ok(Self { csv, cell: String::new() })
     }
 
@@ -55,6 +73,11 @@ impl<W: Write> LogWriter<W> {
     pub fn finish(mut self) -> io::Result<()> {
         self.csv.flush()
     }
+}
+
+/// A text as a cell of CSV that no spreadsheet takes for a formula: an apostrophe goes before one that begins as such.
+pub(crate) fn text_cell(text: &str) -> Cow<'_, str> {
+    if text.starts_with(['=', '+', '-', '@', '\t', '\r']) { format!("'{text}").into() } else { text.into() }
 }
 
 /// Plain digits for usual magnitudes, an exponent for the others: `1e-300` in place of 300 zeros.

@@ -125,8 +125,9 @@ pub fn refine(
 ) -> Result<Refinement, RefineError> {
     let kind = kind_of(model, logs)?;
     check_speeds(options, kind)?;
-    if !held_out.is_empty() {
+    if let Some(other) = held_out.iter().find(|log| !log.serves(kind)) {
         kind_of(model, held_out)?;
+        return Err(mixed(logs, kind, other));
     }
     let searching = &mut |share: f64| watch(SEARCH * share);
     let mut found = match kind {
@@ -191,12 +192,17 @@ fn kind_of(model: &Model, logs: &[Log]) -> Result<LogKind, RefineError> {
     let kind = kind_of(first).unwrap_or(kinds[0]);
     match logs.iter().find(|log| kind_of(log) != Some(kind)) {
         None => Ok(kind),
-        Some(other) => Err(RefineError::MixedLogs {
-            first: first.source.clone(),
-            first_kind: kind,
-            second: other.source.clone(),
-            second_kind: kind_of(other).unwrap_or(kind),
-        }),
+        Some(other) => Err(mixed(logs, kind, other)),
+    }
+}
+
+/// The error where `other` is of another kind than the logs.
+fn mixed(logs: &[Log], kind: LogKind, other: &Log) -> RefineError {
+    RefineError::MixedLogs {
+        first: logs.first().map(|log| log.source.clone()).unwrap_or_default(),
+        first_kind: kind,
+        second: other.source.clone(),
+        second_kind: other.kind().unwrap_or(kind),
     }
 }
 

@@ -13,18 +13,13 @@ pub(super) fn check(logs: &[&Log]) -> Vec<HealthFinding> {
     };
     let finding = |log: &&Log| {
         let own = rate(log).filter(|own| (own / wanted - 1.0).abs() > SAME)?;
-        Some(HealthFinding {
-            severity: Severity::Error,
-            column: "time_s".to_owned(),
-            problem: format!(
-                "{} has {own:.1} rows a second and {} has {wanted:.1}: one filter serves all logs",
-                log.source, first.source
-            ),
-            mend: format!(
-                "record at one rate, or resample every log to {:.1} rows a second",
-                own.min(wanted)
-            ),
-        })
+        let problem = format!(
+            "{} has {own:.1} rows a second and {} has {wanted:.1}: one filter serves all logs",
+            log.source, first.source
+        );
+        let mend =
+            format!("record at one rate, or resample every log to {:.1} rows a second", own.min(wanted));
+        Some(HealthFinding::new(Severity::Error, "time_s", problem, mend))
     };
     logs.iter().filter_map(finding).collect()
 }

@@ -268,7 +268,10 @@ impl Serialize for Tried {
         map.serialize_entry("id", self.kind.id)?;
         map.serialize_entry("detail", &self.detail)?;
         map.serialize_entry("gain_percent", &self.gain_percent)?;
-        map.serialize_entry("z", &self.z)?;
+        // A size that a single moment shows has no standard error.
+        if self.z.is_finite() {
+            map.serialize_entry("z", &self.z)?;
+        }
         map.serialize_entry("fate", self.fate.name())?;
         if let Fate::NotToldFrom(kind) = self.fate {
             map.serialize_entry("not_told_from", kind.id)?;

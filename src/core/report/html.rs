@@ -13,6 +13,13 @@ const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'";
 const NO_DIGIT: char = '\u{2007}';
 const NO_POINT: char = '\u{2008}';
 
+/// Whether a file that begins with these bytes was written by [`document`].
+pub(super) fn is_opening(bytes: &[u8]) -> bool {
+    let empty = document(&Document::default());
+    let opening = empty.split("<title").next().unwrap_or_default();
+    bytes.starts_with(opening.as_bytes())
+}
+
 pub(super) fn document(document: &Document) -> String {
     let mut markup = Markup::default();
     markup.raw("<!DOCTYPE html>\n");

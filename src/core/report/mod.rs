@@ -109,6 +109,11 @@ impl Document {
         html::document(self)
     }
 
+    /// Whether a file that begins with these bytes was written by [`Document::to_html`].
+    pub fn is_opening_of_html(bytes: &[u8]) -> bool {
+        html::is_opening(bytes)
+    }
+
     /// The report as text of at most 100 columns, tables apart.
     pub fn to_text(&self) -> String {
         text::document(self)

@@ -38,7 +38,7 @@ impl MotorLimits {
             (Some(rated), Some(no_load)) if no_load <= rated => Err(ParameterError {
                 name: "no_load_speed_rad_s",
                 value: no_load,
-                allowed: "above rated_speed_rad_s",
+                allowed: "above rated_speed_rad_s".into(),
             }),
             _ => Ok(()),
         }

@@ -127,7 +127,7 @@ impl LinkSettings {
         if self.left_motor_id == self.right_motor_id {
             let allowed = "another number than left_motor_id";
             let value = f64::from(self.right_motor_id);
-            return Err(ParameterError { name: "right_motor_id", value, allowed });
+            return Err(ParameterError { name: "right_motor_id", value, allowed: allowed.into() });
         }
         self.torque_constant_nm_a.map_or(Ok(()), |constant| positive("torque_constant_nm_a", constant))?;
         positive("current_steps_per_a", self.current_steps_per_a)?;

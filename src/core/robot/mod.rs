@@ -51,7 +51,7 @@ pub use chassis::{Chassis, YawHold};
 pub use legs::{HeightNode, HeightTableError, Legs, OverHeight};
 pub use link::{LinkSettings, PitchAxis, StateLayout, TorqueCommand, Turn};
 pub use motor::Motor;
-pub use safety::SafetyLimits;
+pub use safety::{SafetyLimits, StopAction};
 pub use sensors::{SensorSettings, TICK_S};
 pub use surroundings::{Payload, Surroundings, Tether};
 

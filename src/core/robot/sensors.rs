@@ -139,7 +139,7 @@ fn rate(name: &'static str, value: f64) -> Result<(), ParameterError> {
     let period = TICKS_PER_S / value;
     let divides = (1.0..=TICKS_PER_S).contains(&period) && (period - period.round()).abs() < 1e-9 * period;
     let allowed = "a rate from 1 to 1000 that divides 1000, such as 50, 100, 200, 500";
-    if divides { Ok(()) } else { Err(ParameterError { name, value, allowed }) }
+    if divides { Ok(()) } else { Err(ParameterError { name, value, allowed: allowed.into() }) }
 }
 
 #[cfg(test)]

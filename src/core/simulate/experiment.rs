@@ -371,7 +371,9 @@ impl Experiment {
         within("target_speed_rad_s", self.target_speed_rad_s, -1e3..=1e3, "from -1000 to 1000")?;
         if self.target_speed_rad_s == 0.0 {
             let allowed = "other than 0, from which the shaft starts";
-            return Err(ParameterError { name: "target_speed_rad_s", value: 0.0, allowed }.into());
+            return Err(
+                ParameterError { name: "target_speed_rad_s", value: 0.0, allowed: allowed.into() }.into()
+            );
         }
         if let Some(SpeedGains { kp, ki }) = self.speed_gains {
             not_negative("kp", kp)?;

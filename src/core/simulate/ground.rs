@@ -82,7 +82,7 @@ impl Ground {
             let [start, end] = [pair[0], pair[1]];
             if end[0] <= start[0] {
                 let allowed = "at a greater distance than the point before";
-                return Err(ParameterError { name: "points_m", value: end[0], allowed });
+                return Err(ParameterError { name: "points_m", value: end[0], allowed: allowed.into() });
             }
             let slope = (end[1] - start[1]) / (end[0] - start[0]);
             within(

@@ -219,13 +219,13 @@ fn cases() -> Vec<Case> {
         case(Fault::ImuSilent, Some(Fault::ImuReturns), "imu_silent", 50 + 2),
         case(Fault::ImuFrozen, Some(Fault::ImuReturns), "imu_frozen", 200 + 12),
         case(Fault::BusOff, Some(Fault::BusOn), "bus_down", 1),
-        // Asked for every 200 ms, and a reply may be lost.
-        case(Fault::Voltage(18.0), Some(Fault::Voltage(24.0)), "voltage", 2 * 200 + 3),
+        // Asked for every 30 and 60 ms in turn, and a reply may be lost.
+        case(Fault::Voltage(18.0), Some(Fault::Voltage(24.0)), "voltage", 2 * 60 + 3),
         case(
             Fault::MotorErrors(Left, MotorErrors(64)),
             Some(Fault::MotorErrors(Left, MotorErrors(0))),
             "motor_error",
-            2 * 200 + 3,
+            2 * 60 + 3,
         ),
         case(Fault::Push { force_n: 400.0, duration_s: 0.2 }, None, "speed", 600),
     ]
@@ -306,4 +306,71 @@ fn recording_is_whole(host: &Host) {
     }
     assert_eq!(read, [host.counts[0] + host.counts[2], host.packets]);
     assert_eq!(frames.damaged(), 0);
+}
+
+/// What a robot that balances over its real bytes truly does after something goes wrong with it.
+struct Lie {
+    faults: &'static [Fault],
+    stops: &'static [&'static str],
+}
+
+/// Sensors that lie and a second controller, each after 2 s of balancing: the robot is stopped by name before it has
+/// gone far, whatever its sensors say.
+#[test]
+fn a_robot_whose_sensors_lie_is_stopped_before_it_has_gone_far() {
+    use Motor::{Left, Right};
+    let model = presets::paper().robot().unwrap().clone();
+    let lies = [
+        Lie { faults: &[Fault::EncoderFrozen(Left)], stops: &["encoder_frozen", "yaw_mismatch"] },
+        Lie { faults: &[Fault::EncoderFrozen(Right)], stops: &["encoder_frozen", "yaw_mismatch"] },
+        Lie {
+            faults: &[Fault::EncoderFrozen(Left), Fault::EncoderFrozen(Right)],
+            stops: &["encoder_frozen"],
+        },
+        Lie { faults: &[Fault::ImuAngleFrozen], stops: &["imu_stuck"] },
+        Lie { faults: &[Fault::ImuRateZero], stops: &["imu_stuck"] },
+        Lie { faults: &[Fault::ImuAngleOff(0.2)], stops: &["pitch_mismatch"] },
+        Lie { faults: &[Fault::Commanded(Left, 0x81)], stops: &["other_controller"] },
+        Lie { faults: &[Fault::Commanded(Right, 0xA2)], stops: &["other_controller"] },
+        Lie { faults: &[Fault::Commanded(Right, 0xA1)], stops: &["other_controller"] },
+    ];
+    for Lie { faults, stops } in lies {
+        let mut host = Host::new(&model);
+        host.bus.set_rates(FaultRates::default());
+        host.arm();
+        assert_eq!(host.until_stop(2000), None);
+        let start = host.robot.lock().unwrap().pose();
+        faults.iter().for_each(|fault| host.inject(*fault));
+        let (mut moved_m, mut pitch_rad) = (0.0_f64, 0.0_f64);
+        let mut stop = None;
+        while stop.is_none() && host.tick < 60_000 {
+            stop = host.until_stop(1);
+            let state = host.robot.lock().unwrap().state();
+            moved_m = moved_m.max((state.x_m - start.state.x_m).abs());
+            pitch_rad = pitch_rad.max(state.pitch_rad.abs());
+        }
+        let Some((_, reason)) = stop else { panic!("{faults:?}: {moved_m} m, {pitch_rad} rad") };
+        assert!(stops.contains(&reason.name()), "{faults:?}: {reason}");
+        assert!(moved_m < 0.3 && pitch_rad < 0.3, "{faults:?}: {moved_m} m, {pitch_rad} rad");
+    }
+}
+
+/// One command of another controller, of any kind, keeps a robot from being armed.
+#[test]
+fn one_command_of_another_controller_fails_the_checks() {
+    let model = presets::paper().robot().unwrap().clone();
+    for command in [0x80, 0x81, 0x88, 0xA1, 0xA2, 0xA3, 0xA4, 0xA5, 0xA6, 0xA7, 0xA8] {
+        let mut host = Host::new(&model);
+        host.bus.set_rates(FaultRates::default());
+        host.step(&[DriveOrder::Check]);
+        host.run(4500);
+        let open = |host: &Host| {
+            let open = host.drive.checks().iter().find(|check| check.result == CheckResult::Failed);
+            open.map(|check| check.name)
+        };
+        assert_eq!(open(&host), None);
+        host.inject(Fault::Commanded(Motor::Left, command));
+        host.run(1000);
+        assert_eq!(open(&host), Some("no other controller"), "{command:X}");
+    }
 }

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use egui::{Context, Theme};
+use flqr_core::control::gate::Verdict;
 use flqr_core::device::{SessionOptions, Source as DeviceSource};
 use flqr_core::model_file::{Model, Rig, presets};
 
@@ -18,6 +19,7 @@ use crate::friction::Fitted;
 use crate::job::{Job, Outcome, Reporter};
 use crate::layout::Layout;
 use crate::live::LiveCommand;
+use crate::messages::Severity;
 use crate::refine::{RESIDUAL_STACK, RefineCommand, RefineFile, Surroundings};
 use crate::runs::RunsCommand;
 use crate::session::Session;
@@ -183,6 +185,17 @@ impl App {
             Command::RefreshInterfaces => self.robot.look(&self.link, &self.waker),
             Command::Connect => self.connect(),
             Command::Disconnect => self.disconnect(),
+            Command::ApplyGains => self.apply_gains(),
+            Command::ConfirmGains => self.confirm_gains(),
+            Command::FollowGains(follow) => {
+                self.link.transfer.follow = follow;
+                self.send_controller();
+            }
+            Command::StopAndQuit => {
+                self.link.stop();
+                self.link.close(&self.waker);
+                ctx.send_viewport_cmd(egui::ViewportCommand::Close);
+            }
             Command::Order(order) => self.link.send(order),
             Command::ChooseReplay(path) => self.robot.form.replay = path.display().to_string(),
             Command::ChooseRecording(path) => self.robot.note_recording_path(&path),
@@ -271,6 +284,24 @@ impl App {
         self.link.close(&self.waker);
         self.say("Disconnected.");
         self.look_for_interfaces();
+    }
+
+    fn apply_gains(&mut self) {
+        let verdict = self.link.transfer.pending().map(|pending| pending.verdict.clone());
+        match verdict {
+            None => self.say("The robot runs the gains of the design already."),
+            Some(Verdict::Accept) => self.confirm_gains(),
+            Some(Verdict::Ask(changes)) => self.ask(Question::Gains { changes }),
+            Some(Verdict::Refuse(refusal)) => {
+                self.fail(format!("Not applied, the previous gains stay: {refusal}."));
+            }
+        }
+    }
+
+    fn confirm_gains(&mut self) {
+        if self.link.apply_design() {
+            self.say("New gains applied: they fade in over 0.2 s.");
+        }
     }
 
     fn select_source(&mut self, source: Source) {
@@ -416,6 +447,9 @@ impl App {
     pub(super) fn say_loaded(&mut self) {
         let filled_in = self.session.filled_in().map(|text| format!(" {text}")).unwrap_or_default();
         self.say(format!("“{}” is loaded.{filled_in}", self.session.name));
+        for warning in self.session.model().warnings() {
+            self.messages.add(Severity::Warning, warning.to_string());
+        }
     }
 
     /// One file at a time: a later job must not be taken over by the end of an earlier one. Says so.

@@ -431,15 +431,21 @@ impl App {
         taken
     }
 
-    /// Asks before changes of the model are lost with the window.
+    /// Asks before a driven robot is stopped, or changes of the model are lost, with the window.
     pub(super) fn answer_close(&mut self, ctx: &Context) {
-        if self.leaving {
+        if self.leaving && !self.link.is_driven() {
             ctx.send_viewport_cmd(ViewportCommand::Close);
             return;
         }
-        if ctx.input(|input| input.viewport().close_requested()) && self.session != self.saved {
+        let question = match () {
+            () if self.link.is_driven() => Question::LeaveDriven,
+            () if self.session != self.saved => Question::Leave,
+            () => return,
+        };
+        if self.leaving || ctx.input(|input| input.viewport().close_requested()) {
+            self.leaving = false;
             ctx.send_viewport_cmd(ViewportCommand::CancelClose);
-            self.ask(Question::Leave);
+            self.ask(question);
         }
     }
 

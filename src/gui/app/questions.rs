@@ -7,6 +7,7 @@ use egui::{
     Button, Color32, Context, Grid, Id, Key, Modal, Modifiers, RichText, ScrollArea, Stroke, TextEdit,
     TextStyle, Ui, vec2,
 };
+use flqr_core::control::gate::{GainChange, LARGEST_FACTOR};
 use flqr_core::model_file::{Change, Model, presets};
 
 use super::{App, apply};
@@ -14,7 +15,7 @@ use crate::command::{Command, FilePurpose};
 use crate::document::{Document, Left, words};
 use crate::recent::Recent;
 use crate::refine::RefineFile;
-use crate::robot::{STOP_HEIGHT, stop_ui};
+use crate::robot::{STOP_HEIGHT, change_rows_ui, stop_ui};
 use crate::widgets::{hint_ui, mono, warning_ui};
 
 /// Rows of a table of changes that are shown at once.
@@ -24,6 +25,10 @@ const LONGEST_TABLE: f32 = 340.0;
 pub(super) enum Question {
     /// The window is to be closed, and the model is not saved.
     Leave,
+    /// The window is to be closed while the robot is driven.
+    LeaveDriven,
+    /// Gains that change by much are to be applied to the robot.
+    Gains { changes: Vec<GainChange> },
     /// A preset is to replace the model.
     Preset { number: usize, name: &'static str, changes: Vec<Change> },
     /// A window was not closed.
@@ -84,7 +89,8 @@ impl Question {
     /// Whether it is put already by `other`.
     fn is_same(&self, other: &Self) -> bool {
         match (self, other) {
-            (Self::Leave, Self::Leave) | (Self::Steps, Self::Steps) => true,
+            (Self::Leave, Self::Leave) | (Self::LeaveDriven, Self::LeaveDriven) => true,
+            (Self::Steps, Self::Steps) | (Self::Gains { .. }, Self::Gains { .. }) => true,
             (Self::Preset { number, .. }, Self::Preset { number: other, .. }) => number == other,
             (Self::Path { purpose, .. }, Self::Path { purpose: other, .. }) => purpose == other,
             (Self::Overwrite { path, .. }, Self::Overwrite { path: other, .. }) => path == other,
@@ -96,6 +102,8 @@ impl Question {
     pub(super) fn key(&self) -> &'static str {
         match self {
             Self::Leave => "leave",
+            Self::LeaveDriven => "leave-driven",
+            Self::Gains { .. } => "gains",
             Self::Preset { .. } => "preset",
             Self::Restore { .. } => "restore",
             Self::Replace { .. } => "replace",
@@ -115,7 +123,7 @@ impl App {
         }
         match (&self.question, &question) {
             (None, _) => self.question = Some(question),
-            (Some(open), Question::Leave | Question::Restore { .. })
+            (Some(open), Question::Leave | Question::LeaveDriven | Question::Restore { .. })
                 if !matches!(open, Question::Restore { .. }) =>
             {
                 self.waiting.extend(self.question.replace(question));
@@ -256,6 +264,8 @@ impl App {
     fn ask_ui(&self, question: &mut Question, ui: &mut Ui) -> Reply {
         match question {
             Question::Leave => self.leave_ui(ui),
+            Question::LeaveDriven => leave_driven_ui(ui),
+            Question::Gains { changes } => gains_ui(changes, ui),
             Question::Preset { number, name, changes } => preset_ui(*number, name, changes, ui),
             Question::Restore { document, whole, .. } => restore_ui(document, *whole, ui),
             Question::Path { purpose, text, reason, has_focus } => {
@@ -382,6 +392,39 @@ fn with_letter(ui: &Ui, key: Key, name: &str) -> LayoutJob {
         job.append(part, 0.0, format.clone());
     }
     job
+}
+
+fn leave_driven_ui(ui: &mut Ui) -> Reply {
+    ui.heading("Stop the robot and close?");
+    ui.label("The robot is driven. It falls when it is stopped, unless somebody holds it.");
+    let stop = Answer::Send(Command::StopAndQuit);
+    answers_ui(
+        ui,
+        [
+            (Key::S, "Stop and close", "Zero torque, motors off, then close the window", stop),
+            (Key::C, "Cancel", "Go on driving", Answer::Close),
+        ],
+    )
+}
+
+fn gains_ui(changes: &[GainChange], ui: &mut Ui) -> Reply {
+    ui.heading("Apply these gains to the driven robot?");
+    ui.label(format!("They change by more than a factor of {LARGEST_FACTOR}:"));
+    Grid::new("large changes").num_columns(4).striped(true).spacing([24.0, 3.0]).show(ui, |ui| {
+        for head in ["gain", "robot", "design", "change"] {
+            hint_ui(ui, head);
+        }
+        ui.end_row();
+        change_rows_ui(changes, ui);
+    });
+    let apply = Answer::Send(Command::ConfirmGains);
+    answers_ui(
+        ui,
+        [
+            (Key::A, "Apply them", "Fade the new gains in over 0.2 s", apply),
+            (Key::K, "Keep the gains", "The robot goes on with the previous gains", Answer::Close),
+        ],
+    )
 }
 
 fn preset_ui(number: usize, name: &str, changes: &[Change], ui: &mut Ui) -> Reply {

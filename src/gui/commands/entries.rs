@@ -191,7 +191,7 @@ fn file() -> Vec<Entry> {
             menu,
             "quit",
             "Quit",
-            "Close the window; asks if the model is not saved",
+            "Close the window; asks if the model is not saved or the robot is driven",
             &[ctrl(Key::Q)],
             |_| Ok(Command::Quit),
         )
@@ -289,6 +289,14 @@ fn edit() -> Vec<Entry> {
                     Err("there is no other design yet")
                 }
             },
+        ),
+        entry(
+            menu,
+            "apply-gains",
+            "Apply the gains to the robot",
+            "The connected robot gets the gains of the design",
+            &[],
+            |s| if s.gains_wait { Ok(Command::ApplyGains) } else { Err("the robot runs them already") },
         ),
         entry(menu, "controller-lqr", "Use LQR", "Gains alone", &[], |s| match s.controller {
             ControllerKind::Lqr => Err("it is in use"),

@@ -62,6 +62,8 @@ pub(crate) struct Situation<'a> {
     pub(crate) experiment_runs: bool,
     pub(crate) is_connected: bool,
     pub(crate) is_hot: bool,
+    /// Whether the connected robot runs other gains than those of the design.
+    pub(crate) gains_wait: bool,
     pub(crate) controller: ControllerKind,
     pub(crate) model_path: Option<&'a Path>,
     pub(crate) can_undo: bool,

@@ -1,8 +1,9 @@
 //! What is to be run: scenario, duration, seed, and the buttons that start and stop it.
 
 use std::cell::Cell;
+use std::rc::Rc;
 
-use egui::{Button, ComboBox, DragValue, Grid, ProgressBar, RichText, Ui, vec2};
+use egui::{Button, ComboBox, Grid, ProgressBar, RichText, Ui, vec2};
 
 use flqr_core::simulate::{Scenario, SpeedGains};
 
@@ -12,7 +13,7 @@ use super::runs::Runs;
 use crate::command::Command;
 use crate::context::ViewContext;
 use crate::theme::palette;
-use crate::widgets::{hint_ui, number_ui, parse, section_ui, warning_ui};
+use crate::widgets::{entry_ui, hint_ui, number_ui, parse, section_ui, warning_ui};
 
 /// Which of the last entries could not be taken as they were.
 #[derive(Default)]
@@ -77,13 +78,12 @@ fn numbers_ui(settings: &mut Settings, limited: &mut Limited, ui: &mut Ui) {
     });
     ui.end_row();
     ui.label("seed");
-    let negative = Cell::new(None);
-    let read = |text: &str| parse(text).inspect(|value| negative.set(Some(*value < 0.0)));
-    let field = DragValue::new(&mut settings.seed)
-        .update_while_editing(false)
-        .min_size(vec2(58.0, 0.0))
-        .custom_parser(read);
-    let field = ui.add(field).accessible_name("experiment seed");
+    let negative = Rc::new(Cell::new(None));
+    let seen = Rc::clone(&negative);
+    let read = move |text: &str| parse(text).inspect(|value| seen.set(Some(*value < 0.0)));
+    let field = entry_ui(ui, &mut settings.seed, "experiment seed", |field| {
+        field.min_size(vec2(58.0, 0.0)).custom_parser(read)
+    });
     if let Some(negative) = negative.get().or(field.changed().then_some(false)) {
         limited.seed = negative;
     }

@@ -17,7 +17,7 @@ use crate::job::{Job, Outcome, Waker};
 use crate::load::LoadedLog;
 use crate::messages::{Said, Severity};
 use crate::runs::{Run, RunKind, Sources, Value};
-use crate::widgets::{choice_ui, error_ui, hint_ui, section_ui, shown};
+use crate::widgets::{choice_ui, entry_ui, error_ui, hint_ui, section_ui, shown};
 
 /// One report of the optimiser.
 #[derive(Clone, Copy)]
@@ -351,8 +351,7 @@ impl FitRun {
         });
         ui.end_row();
         ui.label("seed");
-        ui.add(egui::DragValue::new(&mut self.seed))
-            .accessible_name("seed")
+        entry_ui(ui, &mut self.seed, "seed", |field| field)
             .on_hover_text("Same log and same seed: same result");
         ui.end_row();
         ui.label("estimate");

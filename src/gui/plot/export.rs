@@ -4,7 +4,7 @@ use std::io::{self, Write};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use egui::{Context, DragValue, Id, Rect, Ui};
+use egui::{Context, Id, Rect, Ui};
 use flqr_core::record::LogWriter;
 use flqr_core::report::Chart;
 
@@ -12,6 +12,7 @@ use super::decimate::Snapshot;
 use crate::job::Waker;
 use crate::picture::Shot;
 use crate::save_form::{FileKind, Layout, SaveForm, Target, Words, with_ending};
+use crate::widgets::{entry_ui, parse};
 use crate::write_file::{Content, Watch, bytes};
 
 /// What is saved of a figure.
@@ -186,8 +187,8 @@ impl Export {
 
 fn size_ui(ui: &mut Ui, size_px: &mut [f64; 2]) {
     for (side, [name, times]) in size_px.iter_mut().zip([["figure width", "×"], ["figure height", "px"]]) {
-        let field = DragValue::new(side).range(200.0..=10_000.0).speed(5.0);
-        ui.add(field).accessible_name(name).on_hover_text(format!("The {name}, px"));
+        entry_ui(ui, side, name, |field| field.range(200.0..=10_000.0).speed(5.0).custom_parser(parse))
+            .on_hover_text(format!("The {name}, px"));
         ui.label(times);
     }
 }

@@ -1,6 +1,6 @@
 //! What is asked: free parameters, seed, and the buttons that start and stop the search.
 
-use egui::{Button, DragValue, Grid, ProgressBar, RichText, TextEdit, Ui, vec2};
+use egui::{Button, Grid, ProgressBar, RichText, TextEdit, Ui, vec2};
 use flqr_core::model_file::Rig;
 use flqr_core::robot::Motor;
 
@@ -9,7 +9,7 @@ use super::run::{Question, Run, Settings, is_of_demo};
 use super::sources::Sources;
 use crate::command::Command;
 use crate::context::ViewContext;
-use crate::widgets::{choice_ui, error_ui, hint_ui, section_ui};
+use crate::widgets::{choice_ui, entry_ui, error_ui, hint_ui, section_ui};
 
 pub(super) fn ui(
     context: &ViewContext<'_>,
@@ -50,8 +50,7 @@ fn settings_ui(context: &ViewContext<'_>, settings: &mut Settings, ui: &mut Ui) 
     );
     ui.end_row();
     ui.label("seed");
-    ui.add(DragValue::new(&mut settings.seed))
-        .accessible_name("seed of the search")
+    entry_ui(ui, &mut settings.seed, "seed of the search", |field| field)
         .on_hover_text("Same model, logs and seed: same result");
     ui.end_row();
 }

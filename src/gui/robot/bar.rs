@@ -5,6 +5,7 @@ use flqr_core::control::drive::{Stage, StopReason};
 use flqr_core::device::{Connection, SessionOrder};
 
 use super::link::{Link, sentence};
+use super::transfer::apply_ui;
 use crate::command::{Command, Commands, Source};
 use crate::context::ViewContext;
 use crate::tab::Tab;
@@ -23,6 +24,10 @@ pub(crate) fn bar_ui(link: &Link, (source, tab): (Source, Tab), commands: &Comma
         chip_ui(link, ui);
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let stop = link.may_drive() && stop_ui(ui, vec2(150.0, STOP_HEIGHT)).clicked();
+            // These two pages have it beside the differences.
+            if !matches!(tab, Tab::Tune | Tab::Robot) {
+                apply_ui(link, commands, ui);
+            }
             recording_ui(link, ui);
             rates_ui(link, ui);
             ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
@@ -97,7 +102,7 @@ pub(super) fn stopped(reason: &StopReason) -> String {
 /// The mend, where the reason itself does not say it.
 fn mend(reason: &StopReason) -> Option<&'static str> {
     Some(match reason {
-        StopReason::Asked => "Release it to arm again.",
+        StopReason::Asked => "Release to arm again.",
         StopReason::Done => "Its recording can be fitted on the Friction tab.",
         StopReason::Tilt { .. } => {
             "Stand it upright; look at the signs of IMU and motors if it fell at once."

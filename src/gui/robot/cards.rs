@@ -70,6 +70,10 @@ fn motor_ui(motor: Motor, status: &MotorStatus, ui: &mut Ui) {
     row_ui(ui, "readings", &rate(status.rate_hz), None);
     age_ui(ui, status.age);
     row_ui(ui, "missed replies", &status.missed.to_string(), (status.missed > 0).then_some(colors.warning));
+    if let Some(round_trip) = status.health.and_then(|health| health.round_trip) {
+        row_ui(ui, "round trip", &with_unit(Some(1e3 * round_trip.as_secs_f64()), 1, "ms"), None)
+            .on_hover_text("Time from a query to its reply");
+    }
     row_ui(ui, "temperature", &with_unit(status.temperature_c, 0, "°C"), None);
     let voltage = status.health.map(|health| health.voltage_v);
     row_ui(ui, "supply", &with_unit(voltage, 1, "V"), None);

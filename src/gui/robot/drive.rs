@@ -6,10 +6,12 @@ use flqr_core::control::drive::{Check, CheckResult, DriveOrder, Excitation, Stag
 use flqr_core::device::{SessionMode, SessionOrder};
 
 use super::bar::{stage_name, stop_ui};
+use super::link::sentence;
+use super::transfer::{choice_of_transfer_ui, pending_ui};
 use crate::command::Command;
 use crate::context::ViewContext;
 use crate::theme::palette;
-use crate::widgets::{choice_ui, hint_ui, section_ui};
+use crate::widgets::{choice_ui, hint_ui, section_ui, warning_ui};
 
 /// The section; says whether STOP was pressed.
 pub(super) fn drive_ui(context: &ViewContext<'_>, ui: &mut Ui) -> bool {
@@ -22,6 +24,7 @@ pub(super) fn drive_ui(context: &ViewContext<'_>, ui: &mut Ui) -> bool {
         return false;
     }
     task_ui(context, ui);
+    unsafe_limits_ui(context, ui);
     steps_ui(context, ui);
     let size = vec2(ui.available_width(), 34.0);
     let stop = ui.vertical_centered(|ui| stop_ui(ui, size).clicked()).inner;
@@ -59,8 +62,18 @@ fn task_ui(context: &ViewContext<'_>, ui: &mut Ui) {
                 context.commands.send(Command::SetController(kind));
             }
         });
-        hint_ui(ui, "Gains follow the Tune tab.");
+        hint_ui(ui, "Gains: Tune tab");
     });
+    choice_of_transfer_ui(context, ui);
+    pending_ui(context, ui);
+}
+
+/// Limits that the model has switched off: whoever arms the robot must know them.
+fn unsafe_limits_ui(context: &ViewContext<'_>, ui: &mut Ui) {
+    let Some(options) = context.link.options() else { return };
+    for limit in options.robot.safety.unsafe_limits() {
+        warning_ui(ui, sentence(&limit));
+    }
 }
 
 fn steps_ui(context: &ViewContext<'_>, ui: &mut Ui) {

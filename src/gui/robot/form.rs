@@ -442,11 +442,13 @@ impl ConnectionForm {
 /// A speed of replays, for a form and a running one; says whether it was changed.
 pub(super) fn speed_ui(speed: &mut f64, ui: &mut Ui) -> bool {
     let [least, greatest] = REPLAY_SPEEDS;
-    let slider = egui::Slider::new(speed, least..=greatest)
-        .logarithmic(true)
-        .suffix(" ×")
-        .custom_parser(crate::widgets::parse);
-    ui.add(slider).accessible_name("replay speed").on_hover_text("1 × is real time").changed()
+    let before = *speed;
+    let slider = egui::Slider::new(speed, least..=greatest).logarithmic(true).show_value(false);
+    ui.add(slider).accessible_name("replay speed").on_hover_text("1 × is real time");
+    number_ui(ui, speed, "replay speed value", 40.0).on_hover_text("1 × is real time");
+    *speed = speed.clamp(least, greatest);
+    ui.label("×");
+    *speed != before
 }
 
 fn rate(text: &str, what: &str) -> Result<u32, String> {

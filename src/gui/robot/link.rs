@@ -5,11 +5,12 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use flqr_core::control::BalanceController;
-use flqr_core::control::drive::{CheckResult, DriveOrder, Stage};
+use flqr_core::control::drive::{CheckResult, DriveOrder, Excitation, Stage};
 use flqr_core::device::{Connection, SessionMode, SessionOptions, SessionOrder, Source, Status, Update};
 use flqr_core::report::capitalised;
 
 use super::feed::{Devices, RobotFeed};
+use super::transfer::Transfer;
 use crate::history::History;
 use crate::job::{Job, Outcome, Waker};
 
@@ -31,8 +32,11 @@ pub(crate) struct Link {
     /// What the session was opened with; of one that has been closed too.
     options: Option<SessionOptions>,
     closing: Option<JoinHandle<()>>,
-    /// When a step of arming was last asked for, until an update surely knows of it.
+    /// When a step of arming was last commanded, until an update surely knows of it.
     arming: Option<Instant>,
+    /// Whether that was the step that switches the motors on.
+    arms: bool,
+    pub(crate) transfer: Transfer,
     interval: Duration,
     pub(crate) history: History,
     pub(crate) status: Option<Status>,
@@ -50,6 +54,8 @@ impl Link {
             options: None,
             closing: None,
             arming: None,
+            arms: false,
+            transfer: Transfer::default(),
             interval: Duration::from_millis(33),
             history: History::default(),
             status: None,
@@ -105,6 +111,12 @@ impl Link {
             && (self.arming.is_some() || matches!(self.stage(), Some(Stage::Checking | Stage::Driving)))
     }
 
+    /// Whether the motors follow the controller, or may from one moment to the next.
+    pub(crate) fn is_driven(&self) -> bool {
+        let arms = self.arms && self.arming.is_some();
+        self.may_drive() && (arms || self.stage() == Some(Stage::Driving))
+    }
+
     /// Whether the second step of arming may be taken.
     pub(crate) fn may_arm(&self) -> bool {
         let drive = self.status.as_ref().and_then(|status| status.drive.as_ref());
@@ -120,6 +132,14 @@ impl Link {
     pub(crate) fn open(&mut self, options: SessionOptions, waker: &Waker) {
         self.close(waker);
         self.forget();
+        let controller = match &options.mode {
+            SessionMode::Drive {
+                controller,
+                excitation: Excitation::Balance | Excitation::BalanceMultisine,
+            } => Some((**controller).clone()),
+            SessionMode::Drive { .. } | SessionMode::Listen => None,
+        };
+        self.transfer.begin(controller);
         self.options = Some(options.clone());
         let (devices, wake, before) = (Arc::clone(&self.devices), Arc::clone(waker), self.closing.take());
         let work = move |_: &_| {
@@ -139,11 +159,15 @@ impl Link {
         (self.status, self.rows, self.replay_is_paused, self.problem) = (None, 0, false, None);
     }
 
-    /// Ends the session: no torque, motors off.
+    /// Ends the session; a robot that it drives is stopped first. A robot that it has not armed is left alone.
     pub(crate) fn close(&mut self, waker: &Waker) {
+        let is_driven = self.is_driven();
         self.arming = None;
+        self.transfer.begin(None);
         let State::Open(mut feed) = std::mem::replace(&mut self.state, State::Closed) else { return };
-        feed.send(SessionOrder::Drive(DriveOrder::Stop));
+        if is_driven {
+            feed.send(SessionOrder::Drive(DriveOrder::Stop));
+        }
         let wake = Arc::clone(waker);
         let ended = std::thread::Builder::new().name("close-session".to_owned()).spawn(move || {
             drop(feed);
@@ -156,7 +180,10 @@ impl Link {
     pub(crate) fn send(&mut self, order: SessionOrder) {
         let State::Open(feed) = &mut self.state else { return };
         match &order {
-            SessionOrder::Drive(DriveOrder::Check | DriveOrder::Arm) => self.arming = Some(Instant::now()),
+            SessionOrder::Drive(order @ (DriveOrder::Check | DriveOrder::Arm)) => {
+                (self.arming, self.arms) = (Some(Instant::now()), *order == DriveOrder::Arm);
+                self.transfer.note_armed();
+            }
             SessionOrder::Pause(paused) => self.replay_is_paused = *paused,
             _ => {}
         }
@@ -170,11 +197,41 @@ impl Link {
         }
     }
 
-    /// Another controller for the robot.
-    pub(crate) fn set_controller(&mut self, controller: BalanceController) {
-        if self.may_drive() {
+    /// Takes in the controller of the design. A robot that is not driven gets it at once, a driven one as
+    /// [`Transfer`] says.
+    pub(crate) fn set_design(&mut self, design: BalanceController) {
+        let is_driven = self.is_driven();
+        let Some(options) = self.options.as_ref().filter(|_| !matches!(self.state, State::Closed)) else {
+            return;
+        };
+        let controller = self.transfer.set_design(&options.robot, design, is_driven);
+        self.send_controller(controller);
+    }
+
+    /// Applies the design that waits. Says whether it was sent.
+    pub(crate) fn apply_design(&mut self) -> bool {
+        let controller = self.transfer.take();
+        let is_there = controller.is_some();
+        self.send_controller(controller);
+        is_there
+    }
+
+    fn send_controller(&mut self, controller: Option<BalanceController>) {
+        if let Some(controller) = controller {
             self.send(SessionOrder::Drive(DriveOrder::Controller(Box::new(controller))));
         }
+    }
+
+    /// Gives a robot that is not driven any more the design that waited.
+    fn apply_after_drive(&mut self) {
+        if self.is_driven() {
+            return;
+        }
+        let Some(options) = self.options.as_ref().filter(|_| matches!(self.state, State::Open(_))) else {
+            return;
+        };
+        let controller = self.transfer.take_again(&options.robot);
+        self.send_controller(controller);
     }
 
     /// Time between two updates.
@@ -194,9 +251,13 @@ impl Link {
             self.history.extend(&update.samples);
         }
         if let Some(update) = updates.last() {
+            let was_driven = self.is_driven();
             self.status = Some(update.status.clone());
             if self.arming.is_some_and(|asked| asked.elapsed() > ORDER_ROUND_TRIP) {
                 self.arming = None;
+            }
+            if was_driven {
+                self.apply_after_drive();
             }
         }
         if died {

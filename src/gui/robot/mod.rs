@@ -13,6 +13,7 @@ mod meaning;
 mod offers;
 mod record;
 mod snapshot;
+mod transfer;
 
 use std::path::Path;
 use std::sync::Arc;
@@ -37,6 +38,7 @@ pub(crate) use form::ConnectionForm;
 use frames::FrameTable;
 pub(crate) use link::{Link, sentence};
 use record::RecordForm;
+pub(crate) use transfer::{change_rows_ui, pending_ui};
 
 /// Height of the tables below which the page scrolls.
 const LEAST_TABLE_HEIGHT: f32 = 230.0;
@@ -181,7 +183,7 @@ impl RobotTab {
             let (name, help) = if context.link.is_replay() {
                 ("Close", "Close the recording")
             } else {
-                ("Disconnect", "Close the connection; a driven robot is stopped")
+                ("Disconnect", "Close the connection; a driven robot is stopped, any other is left alone")
             };
             if ui.button(name).on_hover_text(help).clicked() {
                 context.commands.send(Command::Disconnect);

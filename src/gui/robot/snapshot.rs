@@ -22,6 +22,7 @@ impl RobotTab {
                 _ => None,
             },
             "may_arm": link.may_arm(),
+            "gains": link.transfer.snapshot(),
             "checks": status.and_then(|status| status.drive.as_ref()).map(checks),
             "rows": link.rows,
             "rows_hz": link.rows_hz(),
@@ -90,6 +91,7 @@ fn numbers(status: &Status) -> Value {
             "temperature_c": motor.temperature_c,
             "current_a": motor.current_a,
             "voltage_v": motor.health.map(|health| health.voltage_v),
+            "round_trip_s": motor.health.and_then(|health| health.round_trip).map(|time| time.as_secs_f64()),
             "errors": motor.health.map(|health| health.errors.to_string()),
         })),
         "imu": {

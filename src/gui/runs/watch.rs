@@ -84,6 +84,7 @@ mod tests {
         RecordingStatus {
             file: file.into(),
             rows,
+            rows_lost: 0,
             frames: 2 * rows,
             bytes: 1,
             problem: problem.map(str::to_owned),

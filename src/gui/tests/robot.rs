@@ -4,276 +4,26 @@
 
 mod common;
 
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 use std::time::Duration;
 
+use common::script::*;
 use common::{
     SIZE, TempFile, Window, click, command, enter, next, open, options, random_input, state, until,
 };
 use egui::accesskit::Role;
 use egui::{Event as Input, Key, Modifiers, Vec2, vec2};
 use egui_kittest::{Node, kittest::Queryable};
-use flqr_core::control::drive::{Check, CheckResult, DriveOrder, Excitation, Stage, StopReason};
+use flqr_core::control::drive::{CheckResult, DriveOrder, Excitation, Stage, StopReason};
 use flqr_core::device::{
-    Advice, CanInterface, Connection, Counters, DriveStatus, Event, EventKind, ImuStatus, Interfaces,
-    MotorStatus, RecordingStatus, SerialPort, SessionMode, SessionOptions, SessionOrder, Source, Status,
-    Timing, Update,
+    Advice, Connection, DriveStatus, Event, EventKind, RecordingStatus, SessionMode, SessionOrder, Source,
+    Update,
 };
-use flqr_core::link::{Direction, Frame, FrameId, MotorErrors, MotorHealth, StampedFrame};
+use flqr_core::link::{Direction, Frame, FrameId, StampedFrame};
 use flqr_core::record::Sample;
 use flqr_core::robot::Motor;
-use flqr_gui::robot::{Devices, RobotFeed};
 use flqr_gui::{Tab, WindowOptions};
 use serde_json::Value;
-
-/// What a test sees and says of the scripted robot.
-#[derive(Debug, Default)]
-struct Shared {
-    opened: Vec<SessionOptions>,
-    orders: Vec<SessionOrder>,
-    updates: Vec<Update>,
-    closed: bool,
-    died: bool,
-    refuse: Option<String>,
-    can: Vec<CanInterface>,
-    serial: Vec<SerialPort>,
-    advice: Vec<Advice>,
-}
-
-#[derive(Clone, Debug, Default)]
-struct Script(Arc<Mutex<Shared>>);
-
-impl Script {
-    fn with<R>(&self, f: impl FnOnce(&mut Shared) -> R) -> R {
-        f(&mut self.0.lock().unwrap())
-    }
-
-    /// The robot tells something.
-    fn tell(&self, update: Update) {
-        self.with(|shared| shared.updates.push(update));
-    }
-
-    /// Orders to the drive since the last call.
-    fn drive_orders(&self) -> Vec<DriveOrder> {
-        let orders = self.with(|shared| std::mem::take(&mut shared.orders));
-        let drive = |order| match order {
-            SessionOrder::Drive(order) => Some(order),
-            _ => None,
-        };
-        orders.into_iter().filter_map(drive).collect()
-    }
-}
-
-struct ScriptFeed(Script);
-
-impl RobotFeed for ScriptFeed {
-    fn send(&mut self, order: SessionOrder) {
-        self.0.with(|shared| shared.orders.push(order));
-    }
-
-    fn poll(&mut self) -> Vec<Update> {
-        self.0.with(|shared| std::mem::take(&mut shared.updates))
-    }
-
-    fn has_died(&self) -> bool {
-        self.0.with(|shared| shared.died)
-    }
-}
-
-impl Drop for ScriptFeed {
-    fn drop(&mut self) {
-        self.0.with(|shared| shared.closed = true);
-    }
-}
-
-impl Devices for Script {
-    fn open(
-        &self,
-        options: SessionOptions,
-        _wake: Arc<dyn Fn() + Send + Sync>,
-    ) -> Result<Box<dyn RobotFeed>, String> {
-        self.with(|shared| shared.opened.push(options));
-        match self.with(|shared| shared.refuse.clone()) {
-            Some(problem) => Err(problem),
-            None => Ok(Box::new(ScriptFeed(self.clone()))),
-        }
-    }
-
-    fn interfaces(&self) -> Interfaces {
-        self.with(|shared| Interfaces {
-            can: shared.can.clone(),
-            serial: shared.serial.clone(),
-            advice: shared.advice.clone(),
-        })
-    }
-}
-
-fn can(name: &str, command: Option<&str>) -> CanInterface {
-    CanInterface {
-        name: name.to_owned(),
-        up: command.is_none(),
-        is_virtual: false,
-        state: None,
-        bit_rate: Some(500_000),
-        send_errors: None,
-        receive_errors: None,
-        received: 0,
-        sent: 0,
-        errors: 0,
-        dropped: 0,
-        command: command.map(str::to_owned),
-    }
-}
-
-fn usb(port: &str) -> SerialPort {
-    SerialPort {
-        port: port.to_owned(),
-        stable_name: None,
-        description: Some("CH340".to_owned()),
-        serial_number: None,
-        driver: None,
-        is_usb: true,
-    }
-}
-
-fn health(voltage_v: f64, errors: u8) -> MotorHealth {
-    MotorHealth {
-        time: Duration::ZERO,
-        temperature_c: 41.0,
-        voltage_v,
-        supply_current_a: None,
-        on: Some(true),
-        errors: MotorErrors(errors),
-    }
-}
-
-fn status(time_s: f64) -> Status {
-    let motor = MotorStatus {
-        temperature_c: Some(41.0),
-        health: Some(health(24.1, 0)),
-        current_a: Some(-0.35),
-        rate_hz: 1000.0,
-        age: Some(Duration::from_micros(800)),
-        missed: 3,
-    };
-    Status {
-        time: Duration::from_secs_f64(time_s),
-        connection: Connection::Connected,
-        drive: None,
-        motors: [motor; 2],
-        imu: ImuStatus {
-            rate_hz: 200.0,
-            age: Some(Duration::from_millis(3)),
-            temperature_c: Some(36.0),
-            packets: 4321,
-            corrupted: 7,
-            stray_bytes: 19,
-        },
-        counters: Counters {
-            received: 123_456,
-            sent: 0,
-            received_hz: 2000.0,
-            bus_load: Some(0.43),
-            dropped: 11,
-            lost: 12,
-            errors: 13,
-            late: 14,
-            reconnects: 15,
-        },
-        timing: Timing {
-            ticks: 10_000,
-            median_s: 8e-6,
-            p99_s: 6e-5,
-            greatest_s: 1.3e-3,
-            skipped: 0,
-            histogram: vec![0, 5, 3000, 5000, 1500, 400, 90, 3, 1, 0, 1, 0, 0, 0, 0],
-        },
-        recording: None,
-    }
-}
-
-fn update(time_s: f64) -> Update {
-    Update { samples: Vec::new(), frames: Vec::new(), events: Vec::new(), status: status(time_s) }
-}
-
-fn at_stage(time_s: f64, stage: Stage, checks: &[(&'static str, CheckResult, &str)]) -> Update {
-    let check = |(name, result, text): &(&'static str, CheckResult, &str)| Check {
-        name,
-        result: *result,
-        text: (*text).to_owned(),
-    };
-    let mut update = update(time_s);
-    update.status.drive =
-        Some(DriveStatus { stage, motors_off: false, checks: checks.iter().map(check).collect() });
-    update
-}
-
-fn sample(time_s: f64, x_m: f64) -> Sample {
-    Sample {
-        time_s,
-        x_m,
-        x_dot_m_s: 0.1 * time_s.cos(),
-        pitch_rad: 0.02 * time_s.sin(),
-        pitch_rate_rad_s: 0.0,
-        motor_angle_left_rad: 0.0,
-        motor_angle_right_rad: 0.0,
-        motor_speed_left_rad_s: 0.0,
-        motor_speed_right_rad_s: 0.0,
-        torque_left_nm: 0.0,
-        torque_right_nm: 0.0,
-    }
-}
-
-/// A kilohertz of rows.
-fn rows(from_s: f64, count: usize) -> Vec<Sample> {
-    (0..count).map(|index| from_s + index as f64 * 1e-3).map(|time_s| sample(time_s, time_s.sin())).collect()
-}
-
-fn frame(time_s: f64, id: u16, command: u8) -> StampedFrame {
-    let frame = Frame::full(FrameId::Standard(id), [command, 32, 1, 2, 3, 4, 5, 6]);
-    let direction = if id < 0x142 { Direction::Received } else { Direction::Sent };
-    StampedFrame { time: Duration::from_secs_f64(time_s), direction, frame }
-}
-
-fn script_window(tab: Tab, script: &Script, source: &str) -> Window {
-    let window_options = WindowOptions {
-        devices: Arc::new(script.clone()),
-        source: Some(source.parse().unwrap()),
-        ..options(tab)
-    };
-    let mut window = open(window_options, SIZE);
-    until(&mut window, "connecting", |s| s["robot_tab"]["session"] == "open");
-    window
-}
-
-/// Connected in a session that may drive.
-fn drive_window(script: &Script) -> Window {
-    let window_options = WindowOptions { devices: Arc::new(script.clone()), ..options(Tab::Robot) };
-    let mut window = open(window_options, SIZE);
-    click(&mut window, "emulated");
-    click(&mut window, "May drive");
-    click(&mut window, "Connect");
-    until(&mut window, "connecting", |s| s["robot_tab"]["session"] == "open");
-    tell(&mut window, script, at_stage(0.1, Stage::Listening, &[]));
-    window
-}
-
-fn tell(window: &mut Window, script: &Script, update: Update) {
-    script.tell(update);
-    window.run_steps(3);
-}
-
-const GOOD: &[(&str, CheckResult, &str)] =
-    &[("left motor", CheckResult::Passed, "answers"), ("IMU", CheckResult::Passed, "200 Hz")];
-
-/// From listening to driving, as a person does it.
-fn arm(window: &mut Window, script: &Script) {
-    click(window, "1  Check");
-    tell(window, script, at_stage(0.5, Stage::Checking, GOOD));
-    click(window, "2  Arm");
-    tell(window, script, at_stage(1.0, Stage::Driving, GOOD));
-    script.drive_orders();
-}
 
 #[test]
 fn a_robot_is_listened_to_from_the_command_line_and_nothing_is_sent() {
@@ -529,34 +279,6 @@ fn keys_stop_from_the_moment_that_arming_was_asked_for() {
 }
 
 #[test]
-fn a_new_design_goes_to_the_driven_robot_and_a_new_model_does_not() {
-    let script = Script::default();
-    let mut window = drive_window(&script);
-    arm(&mut window, &script);
-    click(&mut window, "LQR");
-    let orders = script.drive_orders();
-    let [DriveOrder::Controller(controller)] = &*orders else { panic!("{orders:?}") };
-    assert_eq!(controller.feedforward, [None; 2]);
-    click(&mut window, "Tune");
-    enter(&mut window, "pitch weight", "250");
-    let orders = script.drive_orders();
-    let Some(DriveOrder::Controller(controller)) = orders.last() else { panic!("{orders:?}") };
-    assert_eq!(state(&window)["gain"][0][2].as_f64(), Some(controller.gain[(0, 2)]));
-
-    let file = common::TempFile::new("other.toml", &common::ROBOT.replace("Test robot", "Other"));
-    enter(&mut window, "model path", file.name());
-    let refused = until(&mut window, "refusal", |s| {
-        s["message"].as_str().is_some_and(|message| message.contains("stop it before loading another model"))
-    });
-    assert_eq!((&refused["model"], &refused["robot_tab"]["session"]), (&"Test robot".into(), &"open".into()));
-    click(&mut window, "simulated");
-    let refused = state(&window);
-    assert!(refused["message"].as_str().unwrap().contains("stop it before choosing another source"));
-    assert_eq!(refused["source"], "emulated");
-    assert!(script.drive_orders().is_empty());
-}
-
-#[test]
 fn a_closed_session_is_stopped_and_let_go() {
     let script = Script::default();
     let mut window = drive_window(&script);
@@ -701,6 +423,7 @@ fn a_recording_is_started_shown_and_ended() {
     let recording = RecordingStatus {
         file: "/data/run7.csv".into(),
         rows: 1900,
+        rows_lost: 0,
         frames: 7600,
         bytes: 1_250_000,
         problem: None,

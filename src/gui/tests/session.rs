@@ -7,8 +7,8 @@ mod common;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use common::{ROBOT, SIZE, TempFile, Window, click, command, enter, open, options, state, until};
-use egui::{Event, Key, Modifiers, ViewportCommand, ViewportEvent, ViewportId, vec2};
+use common::{ROBOT, SIZE, TempFile, Window, click, closes, command, enter, open, options, state, until};
+use egui::{Event, Key, Modifiers, vec2};
 use egui_kittest::kittest::Queryable;
 use flqr_core::model_file::Model;
 use flqr_gui::{Tab, WindowOptions};
@@ -466,16 +466,6 @@ fn a_question_without_changes_has_no_table() {
     assert!(!closes(&mut window));
     assert!(window.query_by_label("saved").is_none(), "nothing to list");
     keys(&mut window, Modifiers::NONE, Key::C);
-}
-
-/// Asks the window to close, and says whether it would.
-fn closes(window: &mut Window) -> bool {
-    let viewport = window.input_mut().viewports.entry(ViewportId::ROOT).or_default();
-    viewport.events.push(ViewportEvent::Close);
-    window.step();
-    let cancelled = window.output().viewport_output[&ViewportId::ROOT].commands.clone();
-    window.run_steps(2);
-    !cancelled.contains(&ViewportCommand::CancelClose)
 }
 
 #[test]

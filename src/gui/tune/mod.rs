@@ -22,6 +22,7 @@ use crate::command::{Command, FilePurpose, Source};
 use crate::context::ViewContext;
 use crate::design::Designer;
 use crate::panes::{Pane, panes_ui};
+use crate::robot::pending_ui;
 use crate::session::Session;
 use crate::tab::Tab;
 use crate::widgets::hint_ui;
@@ -104,6 +105,7 @@ impl TuneTab {
     fn design_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
         compare::slots_ui(context, ui);
         gains::controller_ui(context, ui);
+        pending_ui(context, ui);
         ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
             self.weights.ui(context, ui);
             gains::ui(context, ui);

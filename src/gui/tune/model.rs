@@ -3,22 +3,25 @@
 use std::path::{Path, PathBuf};
 
 use egui::{TextEdit, Ui};
-use flqr_core::model_file::presets;
+use flqr_core::model_file::{ModelWarning, Rig, presets};
 
 use crate::command::{Command, FilePurpose};
 use crate::context::ViewContext;
-use crate::widgets::{error_ui, section_ui};
+use crate::session::Session;
+use crate::widgets::{error_ui, section_ui, warning_ui};
 
 /// State of the file controls.
 pub(super) struct ModelFiles {
     path: String,
     pub(super) problem: Option<String>,
+    /// Values that look like a slip of the unit, and the model that has them.
+    warnings: Option<(Rig, Vec<ModelWarning>)>,
 }
 
 impl ModelFiles {
     pub(super) fn new(path: Option<&Path>) -> Self {
         let path = path.map(|path| path.display().to_string()).unwrap_or_default();
-        Self { path, problem: None }
+        Self { path, problem: None, warnings: None }
     }
 
     pub(super) fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
@@ -43,6 +46,16 @@ impl ModelFiles {
         if let Some(problem) = &self.problem {
             error_ui(ui, problem);
         }
+        for warning in self.warnings(context.session) {
+            warning_ui(ui, warning.to_string());
+        }
+    }
+
+    fn warnings(&mut self, session: &Session) -> &[ModelWarning] {
+        if self.warnings.as_ref().is_none_or(|(rig, _)| *rig != session.rig) {
+            self.warnings = Some((session.rig.clone(), session.model().warnings()));
+        }
+        self.warnings.as_ref().map_or(&[], |(_, warnings)| warnings)
     }
 
     fn buttons_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui, entered: bool) {

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use super::imu_watch::near_zero;
 use super::sign::{Rocking, Slope};
 use super::stage::{Check, CheckResult};
 use super::watch::Watch;
@@ -9,8 +10,11 @@ use crate::link::MotorHealth;
 use crate::model_file::RobotModel;
 use crate::robot::Motor;
 
-/// A motor or an IMU answers if it was heard within this time, s; motors are asked for their health at 5 Hz.
+/// A motor or an IMU answers if it was heard within this time, s.
 const FRESH_S: f64 = 0.5;
+/// Time after which a command of another controller is forgotten, s: the longest time between two commands of one that
+/// does not drive the robot just now.
+const COMMANDED_S: f64 = 5.0;
 /// Time in which everybody is heard for the first time.
 const FIRST_ANSWERS: Duration = Duration::from_millis(300);
 /// Share of the IMU's rate that has to be there.
@@ -94,6 +98,7 @@ impl Checks {
             check => check,
         }));
         list.push(nobody_else(now, watch));
+        list.push(round_trip(watch, robot));
         list.extend(of_health(watch, robot));
         list.push(self.imu_rate(now, watch, robot));
         list.push(self.imu_alive(now, watch, robot));
@@ -135,7 +140,10 @@ impl Checks {
             Some(problem) if last.tilt_rad.is_some() => failed(NAME, problem.to_string()),
             // Without acceleration a quiet IMU may say the same again and again.
             Some(problem) => waiting(NAME, format!("{problem}, or move the robot")),
-            None => passed(NAME, "its readings change".to_owned()),
+            None => watch.imu.inconsistent(&robot.safety).map_or_else(
+                || passed(NAME, "its readings change".to_owned()),
+                |problem| failed(NAME, problem.to_string()),
+            ),
         }
     }
 
@@ -219,15 +227,40 @@ fn answers(now: Duration, watch: &Watch, motor: Motor, ids: [u8; 2]) -> Check {
     }
 }
 
-/// Nobody asks the motors for torque while they are only queried.
+/// Nobody else commands the motors while they are only queried.
 fn nobody_else(now: Duration, watch: &Watch) -> Check {
     const NAME: &str = "no other controller";
-    let heard = |time: Duration| is_fresh(now, time);
-    if watch.motors.iter().any(|motor| motor.commanded.is_some_and(heard)) {
-        let mend = "another controller on the bus commands the motors: switch it off".to_owned();
-        return failed(NAME, mend);
+    let heard = watch.motors.iter().filter_map(|motor| motor.commanded).max();
+    match heard.map(|(time, command)| (now.saturating_sub(time).as_secs_f64(), command)) {
+        Some((age_s, command)) if age_s <= COMMANDED_S => failed(
+            NAME,
+            format!(
+                "another controller on the bus commanded the motors {age_s:.1} s ago (0x{command:02X}): switch it off"
+            ),
+        ),
+        _ => passed(NAME, "nobody else commands the motors".to_owned()),
     }
-    passed(NAME, "nobody else commands the motors".to_owned())
+}
+
+/// Replies come soon enough.
+fn round_trip(watch: &Watch, robot: &RobotModel) -> Check {
+    const NAME: &str = "round trip";
+    let [Some(left), Some(right)] = watch.motors.map(|motor| motor.round_trips.upper_quartile_s()) else {
+        return waiting(NAME, "is measured".to_owned());
+    };
+    let (slowest_ms, limit_s) = (1e3 * left.max(right), robot.safety.round_trip_s);
+    let found = format!("three of four replies of the motors take at most {slowest_ms:.1} ms");
+    if left.max(right) <= limit_s {
+        return passed(NAME, found);
+    }
+    failed(
+        NAME,
+        format!(
+            "{found}, above {} ms: use a faster CAN adapter or a higher baud rate, close other programs, or raise \
+             round_trip_s in [safety] and delay_s in [actuation]",
+            1e3 * limit_s
+        ),
+    )
 }
 
 fn of_health(watch: &Watch, robot: &RobotModel) -> [Check; 3] {
@@ -302,11 +335,6 @@ fn wrong_steps(motor: Motor, times: f64) -> String {
 
 fn is_fresh(now: Duration, time: Duration) -> bool {
     now.saturating_sub(time).as_secs_f64() <= FRESH_S
-}
-
-/// An angle within half a turn from 0.
-fn near_zero(angle_rad: f64) -> f64 {
-    libm::remainder(angle_rad, std::f64::consts::TAU)
 }
 
 fn passed(name: &'static str, text: String) -> Check {

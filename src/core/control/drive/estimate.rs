@@ -154,6 +154,11 @@ impl Estimator {
         self.moved_on(now, (self.delay_s + lost_s).min(LONGEST_BRIDGE_S), &readings, pitch)
     }
 
+    /// Age of the motors' newest reading, s.
+    pub(super) fn age_s(&self, now: Duration) -> f64 {
+        self.heard().map_or(f64::INFINITY, |(heard, _)| now.saturating_sub(heard).as_secs_f64())
+    }
+
     /// The newest readings of both motors, and the time of the later one.
     fn heard(&self) -> Option<(Duration, [MotorState; 2])> {
         let (left, right) = self.motors[0].zip(self.motors[1])?;

@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use super::stage::{DriveOrder, Stage};
 use crate::ParameterError;
+use crate::control::gate::Refusal;
 use crate::link::{ImuReading, MotorEvent, MotorOrder};
 use crate::record::{BenchSample, Sample};
 
@@ -51,6 +52,9 @@ pub enum DriveError {
         /// Of the command, N m.
         greatest_nm: f64,
     },
+    /// Gains that must not drive the robot.
+    #[error("the robot can be watched but not driven: {0}")]
+    Gains(#[from] Refusal),
     /// A sweep whose dwells are too short.
     #[error("{seconds} s are too short for the speeds of a sweep: give at least {least} s")]
     SweepTooShort {

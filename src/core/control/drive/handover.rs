@@ -2,9 +2,9 @@
 
 use crate::control::{BalanceController, Measurement, Reference};
 
-/// Ticks over which the torque goes over from the old controller's to the new one's: 0.25 s, slow beside the slew of
-/// a motor and fast beside the way of a robot.
-pub(super) const HANDOVER_TICKS: u32 = 250;
+/// Ticks over which new gains fade in: 0.2 s, long compared with the slew of a motor and short compared with the time in
+/// which a robot drives off.
+pub(super) const HANDOVER_TICKS: u32 = 200;
 
 /// The controller in charge, and how far it has taken over.
 ///
@@ -22,6 +22,12 @@ pub(super) struct Handover {
 impl Handover {
     pub(super) fn new(controller: BalanceController) -> Self {
         Self { current: controller, before: None, waiting: None }
+    }
+
+    /// Gives a new controller the parts that hold from connection to disconnection: torque limit, yaw hold and odometry.
+    pub(super) fn complete(&self, new: BalanceController) -> BalanceController {
+        let BalanceController { torque_limit_nm, yaw_hold, odometry, .. } = self.current;
+        BalanceController { torque_limit_nm, yaw_hold, odometry, ..new.without_rotor_angle() }
     }
 
     /// Another controller from the next tick on.
@@ -55,5 +61,33 @@ impl Handover {
             }
         }
         [0, 1].map(|motor: usize| old[motor] + share * (new[motor] - old[motor]))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::control::ControllerKind;
+    use crate::model_file::presets;
+    use crate::robot::State;
+    use nalgebra::Matrix2x4;
+
+    /// The torque at a pitch of 0.1 rad goes in a straight line from the old gain's to the new one's, within 0.2 s.
+    #[test]
+    fn new_gains_fade_in_over_a_fifth_of_a_second() {
+        let robot = presets::paper().robot().unwrap().clone();
+        let made = |pitch_gain| {
+            let gain = Matrix2x4::from_fn(|_, column| if column == 2 { pitch_gain } else { 0.0 });
+            BalanceController::new(ControllerKind::Lqr, &robot, gain).unwrap()
+        };
+        let state = State { pitch_rad: 0.1, ..State::default() };
+        let measurement = Measurement { state, ..Measurement::default() };
+        let mut handover = Handover::new(made(-5.0));
+        handover.hand_over(made(-9.0));
+        for tick in 0..400 {
+            let [torque, _] = handover.step(&measurement, &Reference::default());
+            let expected = 0.5 + 0.4 * (f64::from(tick) / 200.0).min(1.0);
+            assert!((torque - expected).abs() < 1e-12, "{torque} for {expected} at {tick} ms");
+        }
     }
 }

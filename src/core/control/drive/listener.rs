@@ -8,6 +8,7 @@ use super::watch::Watch;
 use crate::link::{ImuReading, MotorEvent};
 use crate::model_file::RobotModel;
 use crate::record::Sample;
+use crate::robot::SafetyLimits;
 
 /// Time after which a sensor that was heard is silent and samples are left out.
 const SILENT: Duration = Duration::from_millis(50);
@@ -22,6 +23,7 @@ const SILENT: Duration = Duration::from_millis(50);
 #[derive(Clone, Debug)]
 pub struct Listener {
     torque_constant_nm_a: f64,
+    limits: SafetyLimits,
     watch: Watch,
     estimator: Estimator,
     /// When and for what current each motor was last asked by another controller.
@@ -34,6 +36,7 @@ impl Listener {
     pub fn new(robot: &RobotModel) -> Self {
         Self {
             torque_constant_nm_a: robot.link.torque_constant_nm_a.unwrap_or(0.0),
+            limits: robot.safety,
             watch: Watch::new(),
             estimator: Estimator::new(robot),
             asked: [None; 2],
@@ -44,9 +47,9 @@ impl Listener {
     /// Takes what was heard since the last call, and gives a sample where something new is there in a
     /// millisecond that has none yet.
     pub fn hear(&mut self, now: Duration, motors: &[MotorEvent], imu: &[ImuReading]) -> Option<Sample> {
-        self.watch.hear(&Inputs { motors, imu, ..Inputs::default() });
+        self.watch.hear(&Inputs { motors, imu, ..Inputs::default() }, &self.limits);
         for event in motors {
-            if let MotorEvent::Asked { motor, time, current_a } = *event
+            if let MotorEvent::Commanded { motor, time, current_a: Some(current_a), .. } = *event
                 && current_a.is_finite()
             {
                 self.asked[motor as usize] = Some((time, current_a));
@@ -57,6 +60,7 @@ impl Listener {
             pitch_rad: 0.0,
             pitch_rate_rad_s: 0.0,
             tilt_rad: None,
+            yaw_rate_rad_s: None,
             temperature_c: None,
         });
         self.estimator.hear(now, self.watch.states(), Some(pitch));

@@ -3,12 +3,15 @@
 //!
 //! One [`Drive::step`] a millisecond, in every stage:
 //! - [`Stage::Listening`]: no order to the motors. [`Listener`] makes samples of what others make the robot do.
-//! - [`Stage::Checking`]: the motors are asked for their state at 200 Hz and their health at 5 Hz, and [`Check`]s say
+//! - [`Stage::Checking`]: the motors are asked for their state at 200 Hz and their health at 22 Hz, and [`Check`]s say
 //!   what is right, what is to be done, and what is wrong with its mend.
-//! - [`Stage::Driving`]: motors on, torques at 1 kHz, which the motors answer with their state, and health at 5 Hz.
-//!   Every watch and limit of `[safety]` is looked at before a torque is asked for.
+//! - [`Stage::Driving`]: motors on, torques at 1 kHz, which the motors answer with their state, and health at 22 Hz.
+//!   Every watch and limit of `[safety]` is looked at before a torque is commanded. The torque limit rises from 0 within
+//!   0.2 s of arming. Small torques then show whether the motors turn the right way (`torque_sign.rs`) and by the right
+//!   amount (`torque_scale.rs`).
 //! - [`Stage::Stopped`]: no torque and motors off in the same step, repeated every 5 ms until both have said that they
-//!   are off; then nothing. A stop out of listening does the same.
+//!   are off; then nothing. A stop before arming sends nothing: the motors were not switched on here. With
+//!   `stop = "zero_then_off"` the motors roll out without torque before they are switched off.
 //!
 //! Torques stay within `torque_nm` and change by `torque_slew_nm_s` at most, both of `[limits]`; only the stop is not
 //! slewed. Way, heading and motor angles count from where the robot was armed, motor angles such that
@@ -19,34 +22,43 @@ mod checks;
 mod estimate;
 mod exchange;
 mod handover;
+mod imu_watch;
 mod listener;
 mod program;
+mod regression;
+mod self_test;
 mod sign;
 mod stage;
 mod switching;
 mod torque_scale;
+mod torque_sign;
 mod watch;
+mod wheel_watch;
 
 pub use exchange::{DriveError, DriveEvent, DriveSettings, Inputs, Orders, Output};
 pub use listener::Listener;
-pub use stage::{Check, CheckResult, DriveOrder, Excitation, Stage, StopReason};
+pub use stage::{Check, CheckResult, DriveOrder, Excitation, ImuValue, Stage, StopReason};
 
 use std::time::Duration;
 
-use crate::control::{BalanceController, Reference};
+use crate::control::{BalanceController, Reference, gate};
 use crate::link::MotorOrder;
 use crate::model_file::RobotModel;
 use crate::record::{BenchSample, Sample};
-use crate::robot::{State, TICK_S};
+use crate::robot::{Motor, State, StopAction, TICK_S};
 use checks::Checks;
 use estimate::Estimator;
+use imu_watch::GravityWatch;
 use program::Program;
+use self_test::{Finding, SelfTest};
 use switching::Switching;
-use torque_scale::{TorqueScale, Verdict};
 use watch::Watch;
+use wheel_watch::WheelWatch;
 
-/// Time between two queries of the motors' health, and of their state where no torque is asked for.
-const HEALTH_PERIOD: Duration = Duration::from_millis(200);
+/// Times between two queries of the motors' health, in turn: with unequal ones a reply that is later than the next query
+/// shows in the round trip.
+const HEALTH_PERIODS: [Duration; 2] = [Duration::from_millis(30), Duration::from_millis(60)];
+/// Time between two queries of the motors' state where no torque is commanded.
 const STATE_PERIOD: Duration = Duration::from_millis(5);
 /// Time between two looks at the checks.
 const CHECK_PERIOD: Duration = Duration::from_millis(50);
@@ -54,6 +66,15 @@ const CHECK_PERIOD: Duration = Duration::from_millis(50);
 const ON_TIMEOUT: Duration = Duration::from_millis(200);
 /// Steps of the current command (LK protocol).
 const CURRENT_STEPS: f64 = 2048.0;
+/// Time from arming until the whole torque is there, s.
+const RAMP_S: f64 = 0.2;
+/// Speed from which on motors that roll out are switched off, rad/s, and age of a reading of it.
+const SLOW_RAD_S: f64 = 1.0;
+const FRESH: Duration = Duration::from_millis(20);
+/// What the LK protocol cannot tell (versions 2.35 and 2.36 have no such parameter).
+const NO_TIMEOUT: &str = "the motors' own time-out cannot be read with the LK protocol: if this computer, the adapter or a \
+    cable fails, they keep their last torque. Set the time-out in the motors with the maker's tool, and keep the switch of \
+    their supply within reach";
 
 /// A robot that is driven, or may be.
 #[derive(Clone, Debug)]
@@ -65,17 +86,21 @@ pub struct Drive {
     slew_nm: f64,
     stage: Stage,
     watch: Watch,
+    wheels: WheelWatch,
+    gravity: GravityWatch,
     estimator: Estimator,
     program: Program,
     checks: Checks,
-    torque_scale: TorqueScale,
+    self_test: SelfTest,
     /// Whether the controller feeds effects forward that depend on angles which are not known here.
     loses_effects: bool,
     reference: Reference,
     asked_nm: [f64; 2],
     armed: Duration,
+    armed_pitch_rad: f64,
     switching: Option<Switching>,
     next_health: Duration,
+    health_queries: usize,
     next_state: Duration,
     next_checks: Duration,
     last_step: Option<Duration>,
@@ -85,8 +110,8 @@ impl Drive {
     /// A robot that is listened to, before the first step.
     ///
     /// # Errors
-    /// A model that does not say how much torque a current makes or how much is allowed, or is out of range, and a
-    /// sweep that is too short.
+    /// A model that does not say how much torque a current makes or how much is allowed, or is out of range, gains that
+    /// [`gate::check`] refuses, and a sweep that is too short.
     pub fn new(
         robot: &RobotModel,
         controller: BalanceController,
@@ -95,6 +120,9 @@ impl Drive {
     ) -> Result<Self, DriveError> {
         robot.validate()?;
         let torque_limit_nm = torque_limit(robot)?;
+        if matches!(excitation, Excitation::Balance | Excitation::BalanceMultisine) {
+            gate::check(robot, &controller)?;
+        }
         let loses_effects = controller.needs_rotor_angle();
         let program = Program::new(robot, controller.without_rotor_angle(), excitation, torque_limit_nm)?;
         Ok(Self {
@@ -103,16 +131,20 @@ impl Drive {
             slew_nm: robot.limits.torque_slew_nm_s.map_or(f64::INFINITY, |slew| slew * TICK_S),
             stage: Stage::Listening,
             watch: Watch::new(),
+            wheels: WheelWatch::new(robot),
+            gravity: GravityWatch::new(robot.parameters.gravity_m_s2, robot.parameters.com_height_m),
             estimator: Estimator::new(robot),
             checks: Checks::new(program.balances(), Duration::ZERO),
-            torque_scale: TorqueScale::new(robot, program.balances(), torque_limit_nm),
+            self_test: SelfTest::new(robot, program.balances(), torque_limit_nm),
             program,
             loses_effects,
             reference: Reference::default(),
             asked_nm: [0.0; 2],
             armed: Duration::ZERO,
+            armed_pitch_rad: 0.0,
             switching: None,
             next_health: Duration::ZERO,
+            health_queries: 0,
             next_state: Duration::ZERO,
             next_checks: Duration::ZERO,
             last_step: None,
@@ -143,7 +175,7 @@ impl Drive {
     /// One tick.
     pub fn step(&mut self, now: Duration, inputs: &Inputs<'_>) -> Output {
         let mut output = Output::default();
-        self.watch.hear(inputs);
+        self.watch.hear(inputs, &self.robot.safety);
         self.estimator.hear(now, self.watch.states(), self.watch.imu.last);
         if let Some(switching) = &mut self.switching {
             switching.hear(inputs.motors);
@@ -186,6 +218,8 @@ impl Drive {
                 "effects that depend on the rotors' own angles are not fed forward: angles count from arming";
             output.events.push(DriveEvent::Warning(text.to_owned()));
         }
+        output.events.extend(self.robot.safety.unsafe_limits().into_iter().map(DriveEvent::Warning));
+        output.events.push(DriveEvent::Warning(NO_TIMEOUT.to_owned()));
         self.checks = Checks::new(self.program.balances(), now);
         (self.next_health, self.next_state, self.next_checks) = (now, now, now);
         self.reach(Stage::Checking, output);
@@ -200,11 +234,14 @@ impl Drive {
         }
         self.estimator.count_from_here();
         self.program.start();
-        self.torque_scale = TorqueScale::new(&self.robot, self.program.balances(), self.torque_limit_nm);
+        self.self_test = SelfTest::new(&self.robot, self.program.balances(), self.torque_limit_nm);
+        self.wheels.restart();
+        self.gravity.restart();
+        self.armed_pitch_rad = self.watch.imu.last.map_or(0.0, |imu| imu.pitch_rad);
         self.reference = Reference::default();
         self.asked_nm = [0.0; 2];
         self.armed = now;
-        self.next_health = now + HEALTH_PERIOD;
+        self.next_health = now + HEALTH_PERIODS[0];
         self.switching = Some(Switching::on(now));
         self.reach(Stage::Driving, output);
     }
@@ -224,14 +261,16 @@ impl Drive {
         let Program::Balance { controller: handover, .. } = &mut self.program else {
             return refuse(output, "wheels in the air are under speed control and take no other controller");
         };
-        if !controller.gain.iter().all(|gain| gain.is_finite()) {
-            return refuse(output, "the new controller has a gain that is no number and is not taken");
+        let controller = handover.complete(controller);
+        if let Err(refusal) = gate::check(&self.robot, &controller) {
+            let text = format!("the new gains are not applied and the previous ones stay: {refusal}");
+            return refuse(output, &text);
         }
-        handover.hand_over(controller.without_rotor_angle());
+        handover.hand_over(controller);
         if stage != Stage::Driving {
             handover.finish();
         }
-        output.events.push(DriveEvent::Note("another controller takes over"));
+        output.events.push(DriveEvent::Note("new gains applied"));
     }
 
     fn refer_to(&mut self, reference: &Reference, output: &mut Output) {
@@ -250,9 +289,7 @@ impl Drive {
         if due(&mut self.next_state, now, STATE_PERIOD) {
             output.orders.push(MotorOrder::ReadState);
         }
-        if due(&mut self.next_health, now, HEALTH_PERIOD) {
-            output.orders.push(MotorOrder::ReadHealth);
-        }
+        self.ask_health(now, output);
         if due(&mut self.next_checks, now, CHECK_PERIOD) {
             self.checks.judge(now, &self.watch, &self.robot);
         }
@@ -267,22 +304,17 @@ impl Drive {
             return self.stop(now, StopReason::NotFinite, output);
         };
         let held = self.estimator.held(&readings);
+        let acted_nm = self.estimator.acting_when_read(now);
+        self.compare_sensors(&held.state, acted_nm);
         let problem = self.problem(now, inputs, &held.state, readings.motor_speed_rad_s);
         if let Some(reason) = problem {
             return self.stop(now, reason, output);
         }
-        let acted_nm = self.estimator.acting_when_read(now);
         if self.settings.torque_scale_check {
-            match self.torque_scale.step(time_s, &readings, acted_nm) {
-                Some(Verdict::Wrong { factor }) => {
-                    return self.stop(now, StopReason::TorqueScale { factor }, output);
-                }
-                Some(Verdict::Unclear) => output.events.push(DriveEvent::Warning(
-                    "whether the motors do what they are asked for is not clear from the nudges: check \
-                     torque_constant_nm_a and current_steps_per_a in [link] yourself"
-                        .to_owned(),
-                )),
-                Some(Verdict::Right) | None => {}
+            match self.self_test.step(time_s, (&readings, self.estimator.age_s(now)), acted_nm) {
+                Some(Finding::Stop(reason)) => return self.stop(now, reason, output),
+                Some(Finding::Warning(text)) => output.events.push(DriveEvent::Warning(text.to_owned())),
+                None => {}
             }
         }
         let program_s = self.program_time_s(time_s);
@@ -296,10 +328,14 @@ impl Drive {
             held
         };
         let wanted = self.program.step(program_s, &measurement, &self.reference);
-        let nudge_nm =
-            if self.settings.torque_scale_check { self.torque_scale.nudge_nm(time_s) } else { 0.0 };
+        let nudges_nm =
+            if self.settings.torque_scale_check { self.self_test.nudge_nm(time_s) } else { [0.0; 2] };
         let limit_nm = self.torque_limit_nm;
-        let wanted = wanted.map(|nm| (nm + nudge_nm).clamp(-limit_nm, limit_nm));
+        let ramp_nm = limit_nm * ((time_s + TICK_S) / RAMP_S).min(1.0);
+        // Nudges stand on top of a torque at the rising limit, or nothing would be seen of them.
+        let wanted = [0, 1].map(|motor: usize| {
+            (wanted[motor].clamp(-ramp_nm, ramp_nm) + nudges_nm[motor]).clamp(-limit_nm, limit_nm)
+        });
         let asked: [f64; 2] = std::array::from_fn(|motor| self.slewed(motor, wanted[motor]));
         if !asked.iter().all(|torque| torque.is_finite()) {
             return self.stop(now, StopReason::NotFinite, output);
@@ -308,9 +344,7 @@ impl Drive {
         self.estimator.remember_asked(now, asked);
         self.switch(now, output);
         output.orders.push(MotorOrder::Torque(asked));
-        if due(&mut self.next_health, now, HEALTH_PERIOD) {
-            output.orders.push(MotorOrder::ReadHealth);
-        }
+        self.ask_health(now, output);
         output.sample = Some(Sample::new(now.as_secs_f64(), &readings, &held.state, asked));
         output.bench = self.program.target_rad_s(program_s).map(|target_speed_rad_s| BenchSample {
             time_s: now.as_secs_f64(),
@@ -321,12 +355,28 @@ impl Drive {
         });
     }
 
+    /// Asks the motors for their health where it is time to.
+    fn ask_health(&mut self, now: Duration, output: &mut Output) {
+        if due(&mut self.next_health, now, HEALTH_PERIODS[self.health_queries % 2]) {
+            self.health_queries += 1;
+            output.orders.push(MotorOrder::ReadHealth);
+        }
+    }
+
+    /// Hands the newest readings to the watches that compare sensors with each other, on the ground.
+    fn compare_sensors(&mut self, state: &State, acted_nm: [f64; 2]) {
+        let [Some(left), Some(right)] = self.watch.states() else { return };
+        let Some(imu) = self.watch.imu.last.filter(|_| self.program.balances()) else { return };
+        self.wheels.hear(&[left, right], &imu, acted_nm, &self.robot.safety);
+        self.gravity.hear(&imu, state);
+    }
+
     /// Time of the program: wheels in the air are nudged before it begins.
     fn program_time_s(&self, time_s: f64) -> f64 {
         if self.program.balances() || !self.settings.torque_scale_check {
             time_s
         } else {
-            (time_s - self.torque_scale.end_s()).max(0.0)
+            (time_s - self.self_test.end_s()).max(0.0)
         }
     }
 
@@ -345,11 +395,19 @@ impl Drive {
             .problem(now, &inputs, limits, self.armed)
             .or_else(|| self.never_on(now))
             .or_else(|| self.watch.imu.frozen(now, limits, balances))
+            .or_else(|| self.watch.imu.inconsistent(limits))
             .or_else(|| {
                 if balances {
                     watch::out_of_bounds(state, limits)
+                        .or_else(|| self.wheels.problem(limits))
+                        .or_else(|| self.wheels.too_fast(limits))
+                        .or_else(|| self.gravity.problem(limits))
                 } else {
-                    watch::too_fast(motor_speed_rad_s, limits)
+                    // The stand may hold the body at any pitch.
+                    let pitch_rad = imu_watch::near_zero(state.pitch_rad - self.armed_pitch_rad);
+                    watch::too_fast(motor_speed_rad_s, limits).or_else(|| {
+                        (pitch_rad.abs() > limits.tilt_rad).then_some(StopReason::Tilt { pitch_rad })
+                    })
                 }
             })
     }
@@ -370,23 +428,43 @@ impl Drive {
         }
     }
 
-    /// No torque and motors off, in this very step.
+    /// Sends zero torque and switches the motors off in this very step. Motors that were not switched on here belong to
+    /// somebody else, and nothing is sent to them.
     fn stop(&mut self, now: Duration, reason: StopReason, output: &mut Output) {
+        let driven = self.stage == Stage::Driving;
         output.orders = Orders::default();
         self.asked_nm = [0.0; 2];
-        self.switching = Some(Switching::off(now));
+        let rolls_out = driven && self.robot.safety.stop == StopAction::ZeroThenOff && !self.is_slow(now);
         self.reach(Stage::Stopped(reason), output);
-        self.switch(now, output);
+        if driven {
+            self.switching =
+                Some(if rolls_out { Switching::off_after_roll_out(now) } else { Switching::off(now) });
+            self.switch(now, output);
+        }
+    }
+
+    /// Whether both motors turn slowly, or one of them is silent.
+    fn is_slow(&self, now: Duration) -> bool {
+        let states = self.watch.states();
+        let heard = states.iter().flatten().filter(|state| now <= state.time + FRESH);
+        heard.clone().count() < Motor::BOTH.len()
+            || heard.clone().all(|state| state.speed_rad_s.abs() < SLOW_RAD_S)
     }
 
     /// Switches the motors on or off until they have said so; each order to be off comes with one of no torque.
     fn switch(&mut self, now: Duration, output: &mut Output) {
+        let is_slow = self.is_slow(now);
         let Some(switching) = &mut self.switching else { return };
+        if is_slow && switching.waits(now) {
+            switching.has_rolled_out();
+        }
         if let Some(order) = switching.due(now) {
             if order == MotorOrder::Off {
                 output.orders.push(MotorOrder::Torque([0.0; 2]));
             }
-            output.orders.push(order);
+            if !switching.waits(now) {
+                output.orders.push(order);
+            }
         }
         if switching.is_done() {
             self.switching = None;

@@ -1,5 +1,7 @@
 //! How far a robot is from being driven, and why it is not any more.
 
+use std::fmt;
+
 use crate::control::{BalanceController, Reference};
 use crate::link::MotorErrors;
 use crate::robot::Motor;
@@ -72,7 +74,7 @@ pub enum Excitation {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum StopReason {
     /// Somebody asked for it.
-    #[error("stop was asked for")]
+    #[error("stop command from the operator")]
     Asked,
     /// The time that was given is over.
     #[error("the time is over")]
@@ -125,11 +127,15 @@ pub enum StopReason {
         /// Which.
         motor: Motor,
     },
-    /// Torques that are not ours.
-    #[error("another controller commands the {motor} motor: switch it off")]
+    /// A command that is not ours.
+    #[error(
+        "another controller sent the {motor} motor the command 0x{command:02X}: switch that controller off"
+    )]
     OtherController {
         /// Which.
         motor: Motor,
+        /// Command byte, or 0x280.
+        command: u16,
     },
     /// Error bits.
     #[error("the {motor} motor reports {errors}")]
@@ -187,6 +193,132 @@ pub enum StopReason {
         /// Speed, rad/s.
         speed_rad_s: f64,
     },
+    /// A wheel turns too fast on the ground.
+    #[error("the {motor} wheel turns at {speed_rad_s:.1} rad/s relative to the body")]
+    WheelSpeed {
+        /// Which.
+        motor: Motor,
+        /// Speed, rad/s.
+        speed_rad_s: f64,
+    },
+    /// The robot turns too fast.
+    #[error("the robot turns at {yaw_rate_rad_s:.2} rad/s")]
+    YawRate {
+        /// Yaw rate, rad/s.
+        yaw_rate_rad_s: f64,
+    },
+    /// Pitch or pitch rate stands still while the other one moves.
+    #[error(
+        "the IMU's {value} has not changed while the {} moved by {turned_rad:.3} rad: switch the IMU off and on, and \
+         check its settings",
+        value.other()
+    )]
+    ImuStuck {
+        /// What stands still.
+        value: ImuValue,
+        /// By how much the other one moved, rad.
+        turned_rad: f64,
+    },
+    /// Pitch and pitch rate contradict each other.
+    #[error(
+        "the IMU's pitch changed by {mismatch_rad:.3} rad more than its pitch rate says: check the IMU, its calibration \
+         and its mounting"
+    )]
+    PitchMismatch {
+        /// Change of the pitch less the integrated rate, rad.
+        mismatch_rad: f64,
+    },
+    /// Pitch and gravity contradict each other.
+    #[error(
+        "gravity says {mismatch_rad:.3} rad more than the IMU's pitch: check the IMU, its calibration and its mounting"
+    )]
+    GravityMismatch {
+        /// Direction of gravity less the pitch, rad.
+        mismatch_rad: f64,
+    },
+    /// A motor's torque must have moved its shaft, and the encoder does not show it.
+    #[error(
+        "the {motor} encoder stands still although the torque must have changed the motor's speed by {missed_rad_s:.1} \
+         rad/s: check the encoder, and that the motor gives torque"
+    )]
+    EncoderFrozen {
+        /// Which.
+        motor: Motor,
+        /// Change of speed that is missing, rad/s.
+        missed_rad_s: f64,
+    },
+    /// The body swings, and neither encoder shows it.
+    #[error("both encoders stand still although the body swings back and forth: check the encoders")]
+    EncodersFrozen,
+    /// A motor's angle and its speed contradict each other.
+    #[error(
+        "the {motor} motor's angle changed by {mismatch_rad:.2} rad more than its speed says: check the encoder, and \
+         encoder_steps in [link]"
+    )]
+    EncoderMismatch {
+        /// Which.
+        motor: Motor,
+        /// Change of the angle less the integrated speed, rad.
+        mismatch_rad: f64,
+    },
+    /// Wheels and IMU contradict each other about the heading.
+    #[error(
+        "the robot turned by {mismatch_rad:.2} rad more by its wheels than by the IMU: check the encoders, that no wheel \
+         slips, and that left_motor_id and right_motor_id in [link] are not swapped"
+    )]
+    YawMismatch {
+        /// Heading by the wheels less that by the IMU, rad.
+        mismatch_rad: f64,
+    },
+    /// A motor turns against its torque.
+    #[error(
+        "the {motor} motor turns against its torque: check the motor's calibration and its phase wires, and \
+         {motor}_direction in [link]"
+    )]
+    TorqueReversed {
+        /// Which.
+        motor: Motor,
+    },
+    /// Each motor turns by the torque of the other one.
+    #[error(
+        "each motor turns by the torque of the other one: check left_motor_id and right_motor_id in [link], and the slots \
+         of torque_command"
+    )]
+    TorquesSwapped,
+    /// Neither wheels nor body move under a torque.
+    #[error(
+        "the robot is held: neither its wheels nor its body moved under a torque. Let it go once it is armed"
+    )]
+    Held,
+    /// Wheels that are to be in the air are not.
+    #[error(
+        "the wheels are on the ground or held: they turned {factor:.2} times as fast as in the air. Lift them, then \
+         check and arm again"
+    )]
+    WheelsOnGround {
+        /// Speed over that in the air.
+        factor: f64,
+    },
+    /// The torque acts later than the model says.
+    #[error(
+        "the torque acts {delay_s:.3} s later than delay_s in [actuation] says: check the latency of the CAN adapter, or \
+         set delay_s and design again"
+    )]
+    TorqueDelay {
+        /// Delay beyond the model's, s.
+        delay_s: f64,
+    },
+    /// Replies come too late.
+    #[error(
+        "replies of the {motor} motor take {round_trip_s:.4} s: use a faster CAN adapter or a higher baud rate, or close \
+         other programs"
+    )]
+    RoundTrip {
+        /// Which.
+        motor: Motor,
+        /// From a query to its reply, s.
+        round_trip_s: f64,
+    },
     /// A motor does much more or less than it is asked for.
     #[error(
         "the motors do {factor:.2} times what they are asked for: check torque_constant_nm_a (0.32 or 0.81) and \
@@ -231,11 +363,52 @@ impl StopReason {
             Self::Speed { .. } => "speed",
             Self::Distance { .. } => "distance",
             Self::MotorSpeed { .. } => "motor_speed",
+            Self::WheelSpeed { .. } => "wheel_speed",
+            Self::YawRate { .. } => "yaw_rate",
+            Self::ImuStuck { .. } => "imu_stuck",
+            Self::PitchMismatch { .. } => "pitch_mismatch",
+            Self::GravityMismatch { .. } => "gravity_mismatch",
+            Self::EncoderFrozen { .. } | Self::EncodersFrozen => "encoder_frozen",
+            Self::EncoderMismatch { .. } => "encoder_mismatch",
+            Self::YawMismatch { .. } => "yaw_mismatch",
+            Self::TorqueReversed { .. } => "torque_reversed",
+            Self::TorquesSwapped => "torques_swapped",
+            Self::Held => "held",
+            Self::WheelsOnGround { .. } => "wheels_on_ground",
+            Self::TorqueDelay { .. } => "torque_delay",
+            Self::RoundTrip { .. } => "round_trip",
             Self::TorqueScale { .. } => "torque_scale",
             Self::NotFinite => "not_finite",
             Self::Late { .. } => "late",
             Self::BusDown => "bus_down",
         }
+    }
+}
+
+/// A value of the IMU.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ImuValue {
+    /// Pitch.
+    Pitch,
+    /// Pitch rate.
+    PitchRate,
+}
+
+impl ImuValue {
+    fn other(self) -> Self {
+        match self {
+            Self::Pitch => Self::PitchRate,
+            Self::PitchRate => Self::Pitch,
+        }
+    }
+}
+
+impl fmt::Display for ImuValue {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(match self {
+            Self::Pitch => "pitch",
+            Self::PitchRate => "pitch rate",
+        })
     }
 }
 

@@ -11,12 +11,17 @@ const REPEAT: Duration = Duration::from_millis(5);
 const OFF: u8 = 0x80;
 const ON: u8 = 0x88;
 
+/// Longest time for which motors roll out without torque before they are switched off.
+const ROLL_OUT: Duration = Duration::from_secs(1);
+
 /// One order, repeated until acknowledged.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Switching {
     order: MotorOrder,
     since: Duration,
     next: Duration,
+    /// Until when the order waits for motors that roll out without torque.
+    waits_until: Duration,
     acknowledged: [bool; 2],
 }
 
@@ -29,8 +34,23 @@ impl Switching {
         Self::new(MotorOrder::Off, now)
     }
 
+    /// Motors off once they have rolled out.
+    pub(super) fn off_after_roll_out(now: Duration) -> Self {
+        Self { waits_until: now + ROLL_OUT, ..Self::off(now) }
+    }
+
     fn new(order: MotorOrder, now: Duration) -> Self {
-        Self { order, since: now, next: now, acknowledged: [false; 2] }
+        Self { order, since: now, next: now, waits_until: now, acknowledged: [false; 2] }
+    }
+
+    /// The motors need not roll out any longer.
+    pub(super) fn has_rolled_out(&mut self) {
+        self.waits_until = self.since;
+    }
+
+    /// Whether the motors roll out.
+    pub(super) fn waits(&self, now: Duration) -> bool {
+        now < self.waits_until
     }
 
     /// Takes what the motors have said since the order was first given; health that says so will do as well.

@@ -7,11 +7,15 @@
 //! q̄(t) = q₀ + q̇₀ t + ½ c t² + f ∬ b ΣT, where b is the model's response to a torque, c the gravity and friction of
 //! those 80 ms, and f the factor that is looked for. What the controller asked for meanwhile is part of ΣT. An unknown
 //! payload changes b little, because mass and inertia grow together in numerator and denominator.
+//!
+//! A wrong factor has other causes than the scale, which are named: the torque acts later than the model says (the
+//! nudge fits when it is shifted), the robot is held (neither wheels nor body move), and wheels that are to be in the
+//! air are on the ground (the body pitches against the nudge, or the wheels do not turn).
 
 use std::ops::RangeInclusive;
 
-use nalgebra::{Matrix4, Vector4};
-
+use super::regression::least_squares;
+use super::stage::StopReason;
 use crate::control::Readings;
 use crate::model_file::RobotModel;
 use crate::robot::TICK_S;
@@ -34,21 +38,30 @@ const DEVIATIONS: f64 = 3.0;
 const LARGEST_DEVIATION: f64 = 0.1;
 const NUDGES: u32 = 3;
 const NEXT_S: f64 = 1.0;
-/// Time between two ticks, and time for which no motor's angle changes, beyond which this computer or the bus stood still
-/// and a nudge may lie, s; it takes so many of those to say that the motors do something else.
+/// Time between two ticks, and age of the motors' reading, beyond which this computer or the bus stood still and a nudge
+/// may lie, s; it takes so many of those to say that the motors do something else.
 const LATE_S: f64 = 0.003;
 const STALE_S: f64 = 0.01;
 const AGREEING: u32 = 2;
+/// Delays beyond the model's that are tried, ticks, and the largest residual compared with that without, squared, of
+/// one that explains the nudge.
+const DELAYS: std::ops::RangeInclusive<usize> = 5..=40;
+const EXPLAINED: f64 = 0.5;
+/// Factors below which wheels do not turn, and above which the body pitches as that of a robot on the ground.
+const HELD: f64 = 0.2;
+const PITCHES: f64 = 0.3;
 
 /// The nudge, and what came of it.
 #[derive(Clone, Debug)]
 pub(super) struct TorqueScale {
     /// Acceleration of both motors under 1 N m in all, rad/s².
     response: f64,
+    /// Acceleration of the body's pitch under the same on the ground, rad/s².
+    pitch_response: f64,
+    balancing: bool,
     start_s: f64,
     nudge_nm: f64,
-    /// Time since the nudge began, s, and mean motor angle, rad; drive's integral once and twice.
-    rows: Vec<(f64, f64, f64)>,
+    rows: Vec<Row>,
     speed: f64,
     way: f64,
     last_s: f64,
@@ -57,7 +70,17 @@ pub(super) struct TorqueScale {
     doubts_left: u32,
     /// Whether anything was late in this nudge.
     is_late: bool,
-    changed_s: f64,
+}
+
+/// Time since the nudge began, s, mean motor angle, rad, pitch rate, rad/s, and integral of the response to the torques
+/// once and twice.
+#[derive(Clone, Copy, Debug)]
+struct Row {
+    since_s: f64,
+    angle_rad: f64,
+    pitch_rate_rad_s: f64,
+    speed: f64,
+    way: f64,
 }
 
 /// What has come of the nudges.
@@ -65,19 +88,16 @@ pub(super) struct TorqueScale {
 pub(super) enum Verdict {
     /// The motors do what they are asked for, as far as payload and friction let see.
     Right,
-    /// They surely do not.
-    Wrong {
-        /// Done over asked.
-        factor: f64,
-    },
+    /// They surely do not, for this reason.
+    Wrong(StopReason),
     /// None of the nudges could be read.
     Unclear,
 }
 
 impl TorqueScale {
     pub(super) fn new(robot: &RobotModel, balancing: bool, torque_limit_nm: f64) -> Self {
+        let b = robot.parameters.linear_model().b;
         let response = if balancing {
-            let b = robot.parameters.linear_model().b;
             b[(1, 0)] / robot.parameters.wheel_radius_m - b[(3, 0)]
         } else {
             0.5 / robot.parameters.wheel_inertia_kg_m2
@@ -85,6 +105,8 @@ impl TorqueScale {
         let nudge_nm = (SPEED_RAD_S / (2.0 * response * HALF_S)).max(LEAST_NM);
         Self {
             response,
+            pitch_response: b[(3, 0)],
+            balancing,
             start_s: if balancing { START_GROUND_S } else { START_AIR_S },
             nudge_nm: nudge_nm.min(GREATEST_SHARE * torque_limit_nm),
             rows: Vec::new(),
@@ -94,7 +116,6 @@ impl TorqueScale {
             nudges_left: if balancing { NUDGES } else { 1 },
             doubts_left: if balancing { AGREEING } else { 1 },
             is_late: false,
-            changed_s: 0.0,
         }
     }
 
@@ -117,8 +138,13 @@ impl TorqueScale {
         }
     }
 
-    /// Takes the readings of a tick and the torques that acted since the last; the verdict, once.
-    pub(super) fn step(&mut self, time_s: f64, readings: &Readings, acted_nm: [f64; 2]) -> Option<Verdict> {
+    /// Takes the readings of a tick, how old the motors' are, and the torques that acted since the last; the verdict, once.
+    pub(super) fn step(
+        &mut self,
+        time_s: f64,
+        (readings, age_s): (&Readings, f64),
+        acted_nm: [f64; 2],
+    ) -> Option<Verdict> {
         let since = time_s - self.start_s;
         let passed_s = if self.rows.is_empty() { TICK_S } else { time_s - self.last_s };
         self.last_s = time_s;
@@ -129,18 +155,17 @@ impl TorqueScale {
         self.way += (self.speed + 0.5 * change) * passed_s;
         self.speed += change;
         let angle = f64::midpoint(readings.motor_angle_rad[0], readings.motor_angle_rad[1]);
-        if self.rows.last().is_none_or(|row| row.1 != angle) {
-            self.changed_s = time_s;
-        }
-        self.is_late |= passed_s > LATE_S || time_s - self.changed_s > STALE_S;
-        self.rows.push((since, angle, self.way));
+        self.is_late |= passed_s > LATE_S || age_s > STALE_S;
+        let Self { speed, way, .. } = *self;
+        let pitch_rate_rad_s = readings.pitch_rate_rad_s;
+        self.rows.push(Row { since_s: since, angle_rad: angle, pitch_rate_rad_s, speed, way });
         if since > 2.0 * HALF_S { self.judge() } else { None }
     }
 
     fn judge(&mut self) -> Option<Verdict> {
-        let found = self.estimate().filter(|(_, deviation)| *deviation < LARGEST_DEVIATION);
+        let found = self.estimate(0).filter(|found| found.deviation < LARGEST_DEVIATION);
         self.nudges_left -= 1;
-        if let Some((factor, deviation)) = found {
+        if let Some(Estimate { factor, deviation, .. }) = found {
             let margin = DEVIATIONS * deviation;
             let wrong = factor + margin < *ALLOWED.start() || factor - margin > *ALLOWED.end();
             if wrong {
@@ -148,7 +173,7 @@ impl TorqueScale {
             }
             if !wrong || self.doubts_left == 0 {
                 self.nudges_left = 0;
-                return Some(if wrong { Verdict::Wrong { factor } } else { Verdict::Right });
+                return Some(if wrong { Verdict::Wrong(self.cause(factor)) } else { Verdict::Right });
             }
         }
         self.rows.clear();
@@ -158,26 +183,55 @@ impl TorqueScale {
         (self.nudges_left == 0).then_some(Verdict::Unclear)
     }
 
-    /// Least squares over the nudge.
-    fn estimate(&self) -> Option<(f64, f64)> {
-        let &(_, first, _) = self.rows.first()?;
-        // Time in shares of the nudge and way in shares of its greatest, so that all columns are of one size.
-        let way = self.rows.iter().fold(0.0_f64, |most, row| most.max(row.2.abs()));
-        let (mut information, mut moment, mut square) = (Matrix4::zeros(), Vector4::zeros(), 0.0);
-        for (since, angle, done) in &self.rows {
-            let time = since / (2.0 * HALF_S);
-            let row = Vector4::new(done / way, 1.0, time, time * time);
-            let moved = angle - first;
-            information += row * row.transpose();
-            moment += row * moved;
-            square += moved * moved;
+    /// Why the factor is wrong.
+    fn cause(&self, factor: f64) -> StopReason {
+        let pitches = self.pitch_factor().is_some_and(|factor| factor.abs() > PITCHES);
+        let turns = factor.abs() > HELD;
+        if !self.balancing && factor < *ALLOWED.start() && (pitches || !turns) {
+            return StopReason::WheelsOnGround { factor };
         }
-        let inverse = information.try_inverse()?;
-        let solution = inverse * moment;
-        let rest = (square - solution.dot(&moment)).max(0.0);
-        let variance = rest / (self.rows.len() as f64 - 4.0).max(1.0) * inverse[(0, 0)];
-        Some((solution[0] / way, variance.max(0.0).sqrt() / way))
+        if let Some(delay_s) = self.delay_s() {
+            return StopReason::TorqueDelay { delay_s };
+        }
+        if self.balancing && !turns && !pitches {
+            return StopReason::Held;
+        }
+        StopReason::TorqueScale { factor }
     }
+
+    /// The delay beyond the model's with which the nudge is that of motors that do what they are commanded.
+    fn delay_s(&self) -> Option<f64> {
+        let residual = self.estimate(0)?.residual;
+        let delayed = DELAYS.filter_map(|ticks| Some((ticks, self.estimate(ticks)?)));
+        let (ticks, best) = delayed.min_by(|(_, a), (_, b)| a.residual.total_cmp(&b.residual))?;
+        let explains = best.residual < EXPLAINED * residual && ALLOWED.contains(&best.factor);
+        explains.then_some(ticks as f64 * TICK_S)
+    }
+
+    /// Least squares over the nudge, with torques that act so many ticks later.
+    fn estimate(&self, delay_ticks: usize) -> Option<Estimate> {
+        let first = self.rows.first()?.angle_rad;
+        let rows = self.rows.iter().enumerate().map(|(index, row)| {
+            let way = index.checked_sub(delay_ticks).map_or(0.0, |earlier| self.rows[earlier].way);
+            ([way, 1.0, row.since_s, row.since_s * row.since_s], row.angle_rad - first)
+        });
+        let fit = least_squares(rows)?;
+        Some(Estimate { factor: fit.value[0], deviation: fit.deviation[0], residual: fit.residual })
+    }
+
+    /// How much of the pitch rate that the nudge gives a robot on the ground the body has shown.
+    fn pitch_factor(&self) -> Option<f64> {
+        let share = self.pitch_response / self.response;
+        let rows = self.rows.iter().map(|row| ([share * row.speed, 1.0, row.since_s], row.pitch_rate_rad_s));
+        Some(least_squares(rows)?.value[0])
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Estimate {
+    factor: f64,
+    deviation: f64,
+    residual: f64,
 }
 
 #[cfg(test)]
@@ -199,7 +253,7 @@ mod tests {
                 continue;
             }
             let readings = Readings { motor_angle_rad: [angle; 2], ..Readings::default() };
-            if let Some(verdict) = scale.step(time_s, &readings, acted) {
+            if let Some(verdict) = scale.step(time_s, (&readings, 0.0), acted) {
                 return Some((time_s, verdict));
             }
             acted = [scale.nudge_nm(time_s); 2];
@@ -210,7 +264,7 @@ mod tests {
     #[test]
     fn a_nudge_with_late_ticks_is_not_believed_alone() {
         let wrong = |found: Option<(f64, Verdict)>| match found {
-            Some((time_s, Verdict::Wrong { .. })) => time_s,
+            Some((time_s, Verdict::Wrong(StopReason::TorqueScale { .. }))) => time_s,
             other => panic!("{other:?}"),
         };
         let (none, hole) = ([9.0, 9.0], [1.02, 1.032]);

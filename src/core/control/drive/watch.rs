@@ -2,49 +2,38 @@
 //!
 //! Each watch fires at the first step later than its time in `[safety]`, thus within that time and one tick.
 
-use std::collections::VecDeque;
 use std::time::Duration;
 
 use super::exchange::Inputs;
+use super::imu_watch::ImuWatch;
 use super::stage::StopReason;
 use crate::link::{ImuReading, MotorEvent, MotorHealth, MotorState};
 use crate::robot::{Motor, SafetyLimits, State, TICK_S};
 
-/// Equal readings in a row from which on an IMU may be frozen: at a low rate two or three may be equal by chance.
-const LEAST_EQUAL_READINGS: u32 = 5;
-/// Time over which the IMU's rate is counted, and the most readings in it.
-const RATE_WINDOW: Duration = Duration::from_secs(1);
-const LEAST_RATE_SPAN_S: f64 = 0.8;
-const MOST_READINGS: usize = 2048;
-/// Longest time without a motor's voltage and errors, which are asked for every 0.2 s.
-const HEALTH_TIMEOUT: Duration = Duration::from_millis(700);
-/// Time within which two commands that are not ours tell of another controller; a single one may be a damaged reply.
-const COMMANDED_TWICE: Duration = Duration::from_millis(100);
+/// Longest time without a motor's voltage and errors, which are asked for some 22 times a second.
+const HEALTH_TIMEOUT: Duration = Duration::from_millis(300);
+/// Time from arming until a motor's health surely answers a query that came after the order to switch on.
+const ON_SETTLE: Duration = Duration::from_millis(100);
+/// Newest round trips of a motor that are remembered: those of about a second.
+const ROUND_TRIPS: usize = 24;
 
 /// What was heard of one motor, and when.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct MotorWatch {
     pub(super) state: Option<MotorState>,
     pub(super) health: Option<MotorHealth>,
-    /// When another controller was heard to command it, and the time before.
-    pub(super) commanded: Option<Duration>,
-    commanded_before: Option<Duration>,
+    /// When another controller was heard last to command it, and the command.
+    pub(super) commanded: Option<(Duration, u16)>,
+    pub(super) round_trips: RoundTrips,
     /// When it was heard again after a silence over which its turns cannot be known.
     turns_lost: Option<Duration>,
 }
 
-/// What was heard of the IMU, and when.
-///
-/// It is frozen where pitch, pitch rate and the direction of acceleration stay the same to the last bit, at five
-/// readings in a row and for longer than `imu_frozen_s`. Angles and rates of a quiet IMU do repeat (a JY901 takes its
-/// rate as 0 at rest); its accelerations, whose noise of about 1 mg is 2 steps, never all stand still. So without
-/// acceleration it can only be told of a robot that moves: one that balances, not one with its wheels in the air.
-#[derive(Clone, Debug)]
-pub(super) struct ImuWatch {
-    pub(super) last: Option<ImuReading>,
-    /// First of the readings that are equal to the last one, and how many they are.
-    equal: (Duration, u32),
-    heard: VecDeque<Duration>,
+/// How long a motor's replies took, s.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct RoundTrips {
+    newest_s: [f64; ROUND_TRIPS],
+    count: usize,
 }
 
 /// Everything that is heard of the robot.
@@ -58,22 +47,17 @@ pub(super) struct Watch {
 
 impl Watch {
     pub(super) fn new() -> Self {
-        let heard = VecDeque::with_capacity(256);
-        Self {
-            motors: [MotorWatch::default(); 2],
-            imu: ImuWatch { last: None, equal: (Duration::ZERO, 0), heard },
-            not_finite: false,
-        }
+        Self { motors: [MotorWatch::default(); 2], imu: ImuWatch::new(), not_finite: false }
     }
 
     /// Takes what was heard; readings that are no numbers are only noted.
-    pub(super) fn hear(&mut self, inputs: &Inputs<'_>) {
+    pub(super) fn hear(&mut self, inputs: &Inputs<'_>, limits: &SafetyLimits) {
         self.not_finite = false;
         for event in inputs.motors {
             if is_finite(event) { self.hear_motor(event) } else { self.not_finite = true }
         }
         for reading in inputs.imu {
-            if is_finite_reading(reading) { self.imu.hear(reading) } else { self.not_finite = true }
+            if is_finite_reading(reading) { self.imu.hear(reading, limits) } else { self.not_finite = true }
         }
     }
 
@@ -85,10 +69,13 @@ impl Watch {
                     *last = Some(state);
                 }
             }
-            MotorEvent::Health(motor, health) => self.motors[motor as usize].health = Some(health),
-            MotorEvent::Asked { motor, time, .. } => {
+            MotorEvent::Health(motor, health) => {
                 let watch = &mut self.motors[motor as usize];
-                watch.commanded_before = watch.commanded.replace(time);
+                watch.health = Some(health);
+                health.round_trip.into_iter().for_each(|time| watch.round_trips.add(time));
+            }
+            MotorEvent::Commanded { motor, time, command, .. } => {
+                self.motors[motor as usize].commanded = Some((time, command));
             }
             MotorEvent::TurnsLost { motor, time, .. } => self.motors[motor as usize].turns_lost = Some(time),
             MotorEvent::Acknowledged { .. } => {}
@@ -141,11 +128,12 @@ impl MotorWatch {
         if self.turns_lost.is_some_and(|time| time > on_since) {
             return Some(StopReason::TurnsLost { motor });
         }
-        if let Some((last, before)) = self.commanded.zip(self.commanded_before)
-            && before > on_since
-            && last < before + COMMANDED_TWICE
-        {
-            return Some(StopReason::OtherController { motor });
+        if let Some((_, command)) = self.commanded.filter(|(time, _)| *time > on_since) {
+            return Some(StopReason::OtherController { motor, command });
+        }
+        let slow = |round_trip_s: &f64| *round_trip_s > limits.round_trip_s;
+        if let Some(round_trip_s) = self.round_trips.upper_quartile_s().filter(slow) {
+            return Some(StopReason::RoundTrip { motor, round_trip_s });
         }
         let temperature_c = self.temperature_c().unwrap_or(0.0);
         if temperature_c > limits.temperature_c {
@@ -158,7 +146,7 @@ impl MotorWatch {
         if !health.errors.is_none() {
             return Some(StopReason::MotorError { motor, errors: health.errors });
         }
-        if health.on == Some(false) && health.time > on_since {
+        if health.on == Some(false) && health.time > on_since + ON_SETTLE {
             return Some(StopReason::MotorOff { motor });
         }
         let voltage_v = health.voltage_v;
@@ -176,46 +164,23 @@ impl MotorWatch {
     }
 }
 
-impl ImuWatch {
-    fn hear(&mut self, reading: &ImuReading) {
-        if self.last.is_some_and(|last| last.time > reading.time) {
-            return;
-        }
-        let values = |r: &ImuReading| (r.pitch_rad, r.pitch_rate_rad_s, r.tilt_rad);
-        match &self.last {
-            Some(last) if values(last) == values(reading) => self.equal.1 += 1,
-            _ => self.equal = (reading.time, 1),
-        }
-        self.last = Some(*reading);
-        if self.heard.len() == MOST_READINGS {
-            self.heard.pop_front();
-        }
-        self.heard.push_back(reading.time);
-        while self.heard.front().is_some_and(|&first| first + RATE_WINDOW < reading.time) {
-            self.heard.pop_front();
-        }
+impl RoundTrips {
+    fn add(&mut self, round_trip: Duration) {
+        self.newest_s[self.count % ROUND_TRIPS] = round_trip.as_secs_f64();
+        self.count += 1;
     }
 
-    /// Readings a second, over the last second; none before most of one has passed.
-    pub(super) fn rate_hz(&self) -> Option<f64> {
-        let (first, last) = self.heard.front().zip(self.heard.back())?;
-        let span_s = (*last - *first).as_secs_f64();
-        (span_s > LEAST_RATE_SPAN_S).then(|| (self.heard.len() - 1) as f64 / span_s)
-    }
-
-    fn silent(&self, now: Duration, limits: &SafetyLimits) -> Option<StopReason> {
-        let silent_s = self.last.map_or(f64::INFINITY, |last| age_s(now, last.time));
-        (silent_s > limits.imu_timeout_s).then_some(StopReason::ImuSilent { silent_s })
-    }
-
-    /// For how long the very same reading has come, if that is longer than allowed.
-    pub(super) fn frozen(&self, now: Duration, limits: &SafetyLimits, balancing: bool) -> Option<StopReason> {
-        let last = self.last?;
-        let (since, count) = self.equal;
-        let frozen_s = age_s(now, since);
-        let can_tell = balancing || last.tilt_rad.is_some();
-        let frozen = can_tell && count >= LEAST_EQUAL_READINGS && frozen_s > limits.imu_frozen_s;
-        frozen.then_some(StopReason::ImuFrozen { frozen_s })
+    /// The time that three quarters of the newest replies took at most, s; none before enough of them are there.
+    pub(super) fn upper_quartile_s(&self) -> Option<f64> {
+        let known = self
+            .newest_s
+            .get(..self.count.min(ROUND_TRIPS))
+            .filter(|known| known.len() >= ROUND_TRIPS / 2)?;
+        let mut sorted = [0.0; ROUND_TRIPS];
+        let sorted = &mut sorted[..known.len()];
+        sorted.copy_from_slice(known);
+        sorted.sort_unstable_by(f64::total_cmp);
+        sorted.get(known.len() * 3 / 4).copied()
     }
 }
 
@@ -245,7 +210,7 @@ pub(super) fn lateness(now: Duration, last_step: Option<Duration>) -> Duration {
     last_step.map_or(Duration::ZERO, |last| now.saturating_sub(last).saturating_sub(tick))
 }
 
-fn age_s(now: Duration, time: Duration) -> f64 {
+pub(super) fn age_s(now: Duration, time: Duration) -> f64 {
     now.saturating_sub(time).as_secs_f64()
 }
 
@@ -257,7 +222,7 @@ fn is_finite(event: &MotorEvent) -> bool {
         }
         MotorEvent::Health(_, health) => health.temperature_c.is_finite() && health.voltage_v.is_finite(),
         MotorEvent::Acknowledged { .. } | MotorEvent::TurnsLost { .. } => true,
-        MotorEvent::Asked { current_a, .. } => current_a.is_finite(),
+        MotorEvent::Commanded { current_a, .. } => current_a.is_none_or(f64::is_finite),
     }
 }
 
@@ -265,4 +230,5 @@ fn is_finite_reading(reading: &ImuReading) -> bool {
     reading.pitch_rad.is_finite()
         && reading.pitch_rate_rad_s.is_finite()
         && reading.tilt_rad.is_none_or(f64::is_finite)
+        && reading.yaw_rate_rad_s.is_none_or(f64::is_finite)
 }

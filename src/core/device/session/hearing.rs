@@ -29,10 +29,12 @@ pub(super) struct Hearing {
     pub(super) motors: Vec<MotorEvent>,
     pub(super) imu: Vec<ImuReading>,
     ids: BTreeSet<FrameId>,
+    /// Whether the IMU is on a line of its own, and so tells nothing of the source of frames.
+    imu_is_apart: bool,
 }
 
 impl Hearing {
-    pub(super) fn new(settings: &LinkSettings, signals: Option<Signals>) -> Self {
+    pub(super) fn new(settings: &LinkSettings, signals: Option<Signals>, imu_is_apart: bool) -> Self {
         Self {
             wheels: Wheels::new(settings),
             signals,
@@ -41,7 +43,13 @@ impl Hearing {
             motors: Vec::new(),
             imu: Vec::new(),
             ids: BTreeSet::new(),
+            imu_is_apart,
         }
+    }
+
+    /// A frame that this program sends, by which its reply is told from a command of somebody else.
+    pub(super) fn sent(&mut self, frame: &StampedFrame) {
+        self.motors.extend(self.wheels.receive(frame));
     }
 
     pub(super) fn clear(&mut self) {
@@ -88,7 +96,7 @@ impl Hearing {
                     tally.motor(&shown);
                 }
                 Heard::Imu(reading) => {
-                    tally.imu(&reading);
+                    tally.imu(&reading, true);
                     self.imu.push(reading);
                 }
             }
@@ -125,7 +133,7 @@ impl Hearing {
             if let Some(reading) = self.assembler.push(time, &packet)
                 && !self.frames_have_pitch()
             {
-                tally.imu(&reading);
+                tally.imu(&reading, !self.imu_is_apart);
                 self.imu.push(reading);
             }
         }

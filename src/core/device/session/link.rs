@@ -5,7 +5,7 @@ use std::time::Duration;
 use super::player::Player;
 use super::types::SessionOrder;
 use super::wire::{Inbox, Wire};
-use crate::link::{Emulator, Frame};
+use crate::link::{Direction, Emulator, Frame, StampedFrame};
 
 /// What was heard since the last tick.
 #[derive(Default)]
@@ -16,8 +16,8 @@ pub(super) struct Heard {
 /// The way to the robot.
 pub(super) enum Link {
     Wire(Wire),
-    /// A robot in memory, moved on by the control loop itself.
-    Emulated(Box<Emulator>),
+    /// A robot in memory, moved on by the control loop itself, and the frames that it has taken.
+    Emulated(Box<Emulator>, Vec<StampedFrame>),
     /// A recording, which is played by a loop of its own.
     Replay(Box<Player>),
 }
@@ -28,28 +28,45 @@ impl Link {
         match self {
             Self::Wire(wire) => wire.collect(&mut heard.inbox),
             Self::Replay(_) => {}
-            Self::Emulated(robot) => {
+            Self::Emulated(robot, sent) => {
                 robot.advance(now);
-                heard.inbox.frames.clear();
-                heard.inbox.frames.extend(std::iter::from_fn(|| robot.frames(now)));
-                heard.inbox.imu.clear();
+                let inbox = &mut heard.inbox;
+                inbox.clear();
+                inbox.sent.append(sent);
+                inbox.frames.extend(std::iter::from_fn(|| robot.frames(now)));
                 let bytes = robot.imu_bytes(now);
                 if !bytes.is_empty() {
-                    heard.inbox.imu.push((now, bytes));
+                    inbox.imu.push(now, &bytes);
                 }
             }
         }
     }
 
-    /// Sends a frame; `false` where it was not taken.
+    /// Hands a frame over for sending; `false` where it was not taken. [`Link::collect`] gives it once it was sent.
     pub(super) fn send(&mut self, now: Duration, frame: Frame) -> bool {
         match self {
-            Self::Wire(wire) => wire.send(frame),
-            Self::Emulated(robot) => {
+            Self::Wire(wire) => wire.send(now, frame),
+            Self::Emulated(robot, sent) => {
                 robot.receive(now, &frame);
-                !robot.bus_is_off()
+                let taken = !robot.bus_is_off();
+                if taken {
+                    sent.push(StampedFrame { time: now, direction: Direction::Sent, frame });
+                }
+                taken
             }
             Self::Replay(_) => false,
+        }
+    }
+
+    /// For how long a frame has been waiting to be sent because a thread of this program comes late.
+    pub(super) fn backlog(&mut self, now: Duration) -> Duration {
+        if let Self::Wire(wire) = self { wire.backlog(now) } else { Duration::ZERO }
+    }
+
+    /// Sends what waits, and nothing from then on.
+    pub(super) fn finish_sending(&mut self) {
+        if let Self::Wire(wire) = self {
+            wire.finish_sending();
         }
     }
 
@@ -70,7 +87,7 @@ impl Link {
     /// Orders to the robot behind the link.
     pub(super) fn order(&mut self, order: &SessionOrder) {
         match (self, order) {
-            (Self::Emulated(robot), SessionOrder::Push { force_n, duration_s }) => {
+            (Self::Emulated(robot, _), SessionOrder::Push { force_n, duration_s }) => {
                 robot.push(*force_n, *duration_s);
             }
             (Self::Replay(player), order) => player.order(order),
@@ -83,7 +100,7 @@ impl Link {
     pub(super) fn problem(&self) -> Option<String> {
         match self {
             Self::Wire(wire) => wire.problem(),
-            Self::Emulated(robot) => robot.bus_is_off().then(|| "bus off".to_owned()),
+            Self::Emulated(robot, _) => robot.bus_is_off().then(|| "bus off".to_owned()),
             Self::Replay(_) => None,
         }
     }
@@ -100,7 +117,7 @@ impl Link {
                 let health = wire.health();
                 [health.dropped(), health.errors(), health.reconnects()]
             }
-            Self::Emulated(_) => [0; 3],
+            Self::Emulated(..) => [0; 3],
             Self::Replay(player) => [0, player.counts().damaged, 0],
         }
     }

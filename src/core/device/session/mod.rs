@@ -7,6 +7,7 @@ mod player;
 mod publisher;
 mod rate;
 mod recording;
+mod relay;
 mod replaying;
 mod tally;
 mod types;
@@ -16,19 +17,22 @@ mod worker;
 pub use files::FileError;
 pub use publisher::Waker;
 pub use types::{
-    Connection, Counters, Described, DriveStatus, Event, EventKind, ImuStatus, MotorStatus, RecordingStatus,
-    SerialAddress, SerialAddressError, SessionMode, SessionOptions, SessionOrder, Source, SourceError,
-    Status, Timing, Update,
+    Connection, Counters, Described, DriveStatus, Ending, Event, EventKind, ImuStatus, MotorStatus,
+    RecordingStatus, SerialAddress, SerialAddressError, SessionMode, SessionOptions, SessionOrder, Source,
+    SourceError, Status, Timing, Update,
 };
 
 use std::collections::VecDeque;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::thread::{Builder, JoinHandle};
 use std::time::{Duration, SystemTime};
 
+use super::pacer::lock_memory;
+use super::stop::StopLine;
 use super::{Clock, OpenError, Pacer, hurry, open_bus, open_imu};
-use crate::control::drive::{Drive, DriveError, DriveSettings, Excitation, Listener};
+use crate::control::drive::{Drive, DriveError, DriveOrder, DriveSettings, Excitation, Listener};
 use crate::control::{BalanceController, ControlError, ControllerKind};
 use crate::link::dbc::{self, Dbc, SignalMap};
 use crate::link::{Emulator, EmulatorSettings, MotorOrder, Wheels};
@@ -103,8 +107,10 @@ pub struct Session {
     orders: Option<SyncSender<SessionOrder>>,
     /// Orders that did not fit into the channel; none is ever dropped.
     waiting: VecDeque<SessionOrder>,
+    /// Stops are not orders: nothing holds them up.
+    stop_line: Arc<StopLine>,
     updates: Receiver<Update>,
-    thread: Option<JoinHandle<()>>,
+    thread: Option<JoinHandle<Ending>>,
 }
 
 impl Session {
@@ -116,10 +122,15 @@ impl Session {
     pub fn open(options: SessionOptions, wake: Waker) -> Result<Self, SessionError> {
         let clock = Clock::start();
         let signals = options.dbc.as_ref().map(|described| signals(described, &options)).transpose()?;
-        let mut hearing = Hearing::new(&options.robot.link, signals);
+        let mut hearing = Hearing::new(&options.robot.link, signals, options.imu.is_some());
         let (order_sender, orders) = sync_channel(ORDERS);
         let (update_sender, updates) = sync_channel(UPDATES);
-        let link = open_link(&options, clock)?;
+        let stop_line = StopLine::register();
+        let drives = options.mode != SessionMode::Listen;
+        if !drives {
+            stop_line.end();
+        }
+        let link = open_link(&options, clock, &stop_line)?;
         let about = About {
             source: options.source.to_string(),
             interface: options.source.interface(),
@@ -148,21 +159,33 @@ impl Session {
             tally: Tally::new(options.source.bit_rate()),
             recording,
             orders,
+            stop_line: Arc::clone(&stop_line),
             drive_orders: Vec::new(),
-            publisher: Publisher::new(update_sender, wake),
+            publisher: if matches!(options.source, Source::Replay { .. }) {
+                Publisher::direct(update_sender, wake)
+            } else {
+                Publisher::relayed(update_sender, wake)?
+            },
         };
         let thread = Builder::new().name("control".to_owned()).spawn(move || {
             // A recording is in no hurry, and must not keep a core from everybody else.
             if matches!(worker.link, Link::Replay(_)) {
                 return worker.replay();
             }
-            worker.work(hurry());
+            worker.work(hurry())
         })?;
-        Ok(Self { orders: Some(order_sender), waiting: VecDeque::new(), updates, thread: Some(thread) })
+        if drives {
+            lock_memory();
+        }
+        let (orders, waiting) = (Some(order_sender), VecDeque::new());
+        Ok(Self { orders, waiting, stop_line, updates, thread: Some(thread) })
     }
 
-    /// Hands an order over without waiting.
+    /// Hands an order over without waiting. A stop overtakes the orders before it.
     pub fn send(&mut self, order: SessionOrder) {
+        if order == SessionOrder::Drive(DriveOrder::Stop) {
+            return self.stop_line.request();
+        }
         self.waiting.push_back(order);
         self.flush();
     }
@@ -189,6 +212,18 @@ impl Session {
         self.updates.recv_timeout(timeout).ok()
     }
 
+    /// Switches the motors off, if it has switched them on, ends everything and returns what the session has come to;
+    /// `None` where its thread has ended by a defect of this program.
+    pub fn close(mut self) -> Option<Ending> {
+        self.end()
+    }
+
+    fn end(&mut self) -> Option<Ending> {
+        self.orders = None;
+        // The thread may have panicked; the sending thread has then switched the motors off.
+        self.thread.take()?.join().ok()
+    }
+
     /// Whether its threads have ended although nobody asked for it: a fault of this program.
     pub fn has_died(&self) -> bool {
         self.thread.as_ref().is_none_or(JoinHandle::is_finished)
@@ -197,15 +232,15 @@ impl Session {
 
 impl Drop for Session {
     fn drop(&mut self) {
-        self.orders = None;
-        if let Some(thread) = self.thread.take() {
-            // One that panicked has ended as well; the sending thread has then switched the motors off.
-            thread.join().unwrap_or(());
-        }
+        self.end();
     }
 }
 
-fn open_link(options: &SessionOptions, clock: Clock) -> Result<Link, SessionError> {
+fn open_link(
+    options: &SessionOptions,
+    clock: Clock,
+    stop_line: &Arc<StopLine>,
+) -> Result<Link, SessionError> {
     let listens = options.mode == SessionMode::Listen;
     match &options.source {
         Source::Can { .. } | Source::Slcan { .. } => {
@@ -214,7 +249,7 @@ fn open_link(options: &SessionOptions, clock: Clock) -> Result<Link, SessionErro
             let wheels = Wheels::new(&options.robot.link);
             let off = [MotorOrder::Torque([0.0; 2]), MotorOrder::Off];
             let farewell = off.iter().flat_map(|order| wheels.frames(order)).collect();
-            Ok(Link::Wire(Wire::start(clock, bus, imu, farewell)?))
+            Ok(Link::Wire(Wire::start(clock, bus, imu, farewell, Arc::clone(stop_line))?))
         }
         Source::Emulated => {
             let settings = EmulatorSettings {
@@ -223,7 +258,8 @@ fn open_link(options: &SessionOptions, clock: Clock) -> Result<Link, SessionErro
                 on_board: if listens { on_board(&options.robot)? } else { None },
                 ..EmulatorSettings::default()
             };
-            Ok(Link::Emulated(Box::new(Emulator::new(&options.robot, settings)?)))
+            let robot = Emulator::new(&options.robot, settings)?;
+            Ok(Link::Emulated(Box::new(robot), Vec::new()))
         }
         Source::Replay { .. } if !listens => {
             Err(SessionError::ReplayDriven { source_name: options.source.to_string() })

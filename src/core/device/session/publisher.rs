@@ -5,17 +5,26 @@ use std::sync::Arc;
 use std::sync::mpsc::{SyncSender, TrySendError};
 use std::time::Duration;
 
+use super::relay::{MOST_SAMPLES, Relay};
 use super::types::{Event, Status, Update};
+use crate::device::RecorderInput;
 use crate::link::StampedFrame;
 use crate::record::Sample;
 
 /// Wakes whoever shows the updates.
 pub type Waker = Arc<dyn Fn() + Send + Sync>;
 
+/// Who hands updates over.
+enum Outlet {
+    /// The thread that gathers them: that of a recording.
+    Direct(SyncSender<Update>, Waker),
+    /// A thread of its own, so that a control loop is never held up.
+    Relay(Relay),
+}
+
 /// Gathers what has happened since the last update.
 pub(super) struct Publisher {
-    updates: SyncSender<Update>,
-    wake: Waker,
+    outlet: Outlet,
     pub(super) interval: Duration,
     next: Duration,
     pub(super) samples: Vec<Sample>,
@@ -26,14 +35,23 @@ pub(super) struct Publisher {
 }
 
 impl Publisher {
-    pub(super) fn new(updates: SyncSender<Update>, wake: Waker) -> Self {
+    /// For a thread that may wait.
+    pub(super) fn direct(updates: SyncSender<Update>, wake: Waker) -> Self {
+        Self::new(Outlet::Direct(updates, wake))
+    }
+
+    /// For a control loop: neither gathering nor [`Publisher::publish`] allocates memory or waits.
+    pub(super) fn relayed(updates: SyncSender<Update>, wake: Waker) -> std::io::Result<Self> {
+        Ok(Self::new(Outlet::Relay(Relay::start(updates, wake)?)))
+    }
+
+    fn new(outlet: Outlet) -> Self {
         Self {
-            updates,
-            wake,
+            outlet,
             interval: Duration::from_millis(33),
             next: Duration::ZERO,
-            samples: Vec::new(),
-            frames: VecDeque::new(),
+            samples: Vec::with_capacity(MOST_SAMPLES),
+            frames: VecDeque::with_capacity(Update::FRAMES),
             events: Vec::new(),
             held: false,
         }
@@ -56,13 +74,23 @@ impl Publisher {
         due
     }
 
-    /// Sends an update; gives the number of samples that did not get through because nobody takes them.
-    /// Events wait for the next one.
-    pub(super) fn publish(&mut self, status: Status) -> u64 {
-        self.send(status).map_or(0, |update| {
-            self.events = update.events;
-            update.samples.len() as u64
-        })
+    /// Sends an update off, whose status `fill` writes and whose recording is that of `recorder`; gives the number of
+    /// samples that did not get through because nobody takes them. Where the last update is still being sent, all waits
+    /// for the next call.
+    pub(super) fn publish(&mut self, recorder: Option<RecorderInput>, fill: impl FnOnce(&mut Status)) -> u64 {
+        let Outlet::Relay(relay) = &mut self.outlet else { return 0 };
+        if let Some(mut parcel) = relay.take() {
+            parcel.samples.append(&mut self.samples);
+            parcel.frames.clear();
+            parcel.frames.extend(self.frames.drain(..));
+            parcel.events.append(&mut self.events);
+            parcel.recorder = recorder;
+            fill(&mut parcel.status);
+            relay.hand_over(parcel);
+        }
+        let too_many = self.samples.len().saturating_sub(MOST_SAMPLES / 2);
+        self.samples.drain(..too_many);
+        relay.lost() + too_many as u64
     }
 
     /// Sends an update; where nobody takes it, all of it waits for the next one.
@@ -87,9 +115,10 @@ impl Publisher {
             events: std::mem::take(&mut self.events),
             status,
         };
-        match self.updates.try_send(update) {
+        let Outlet::Direct(updates, wake) = &self.outlet else { return Some(update) };
+        match updates.try_send(update) {
             Ok(()) => {
-                (self.wake)();
+                wake();
                 None
             }
             Err(TrySendError::Full(update) | TrySendError::Disconnected(update)) => Some(update),

@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 use std::thread::{Builder, JoinHandle};
 
-use super::types::EventKind;
+use super::types::{EventKind, RecordingStatus};
 use crate::device::{Recorder, RecorderInput};
 use crate::record::recording::About;
 
@@ -95,12 +95,12 @@ impl Recording {
     }
 
     /// Ends it, and waits until the files are whole.
-    pub(super) fn end(&mut self) {
+    pub(super) fn end(&mut self) -> Option<RecordingStatus> {
         if let Some(work) = self.work.take() {
             self.take_up(work);
         }
         self.input = None;
-        self.recorder.take().map(finish);
+        self.recorder.take().map(Recorder::finish)
     }
 }
 

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::link::Link;
 use super::player::Player;
-use super::types::EventKind;
+use super::types::{Ending, EventKind};
 use super::worker::Worker;
 use crate::record::{LogError, ReplayCounts, ReplayItem};
 
@@ -16,7 +16,7 @@ const MOST_SAMPLES: usize = 8192;
 impl Worker {
     /// Until the session's handle is dropped. Nothing is lost on the way: where nobody takes the updates, or the
     /// recorder cannot keep up, the replay waits.
-    pub(super) fn replay(mut self) {
+    pub(super) fn replay(mut self) -> Ending {
         let mut slice_end = None;
         let mut told = Vec::new();
         loop {
@@ -48,7 +48,7 @@ impl Worker {
                 self.offer();
             }
         }
-        self.recording.end();
+        self.end()
     }
 
     fn player(&mut self) -> Option<&mut Player> {

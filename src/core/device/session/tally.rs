@@ -2,13 +2,12 @@
 
 use std::time::Duration;
 
-use super::rate::Rate;
+use super::rate::{Peak, Rate};
 use super::types::{Counters, ImuStatus, MotorStatus};
 use crate::device::Tick;
 use crate::link::{Direction, FrameKind, ImuReading, MotorEvent, StampedFrame, bus_load};
 use crate::record::Sample;
 use crate::record::recording::Row;
-use crate::robot::Motor;
 
 /// Everything that is counted.
 #[derive(Default)]
@@ -17,9 +16,12 @@ pub(super) struct Tally {
     bit_rate: Option<u32>,
     received: Rate,
     bits: Rate,
+    lateness: Peak,
     counters: Counters,
     motors: [MotorTally; 2],
     imu: ImuTally,
+    /// When the robot was last heard through the source that was named.
+    heard: Option<Duration>,
 }
 
 #[derive(Default)]
@@ -69,6 +71,7 @@ impl Tally {
             MotorEvent::State(motor, state) => {
                 let tally = &mut self.motors[*motor as usize];
                 tally.heard = Some(state.time);
+                self.heard = self.heard.max(Some(state.time));
                 tally.rate.add(state.time, 1.0);
                 tally.answered += 1;
                 // Either may not be known of a robot that a DBC file describes.
@@ -80,12 +83,18 @@ impl Tally {
                 let tally = &mut self.motors[*motor as usize];
                 tally.status.temperature_c = Some(health.temperature_c);
                 tally.status.health = Some(*health);
+                self.heard = self.heard.max(Some(health.time));
             }
-            MotorEvent::Acknowledged { .. } | MotorEvent::Asked { .. } | MotorEvent::TurnsLost { .. } => {}
+            MotorEvent::Acknowledged { .. } | MotorEvent::Commanded { .. } | MotorEvent::TurnsLost { .. } => {
+            }
         }
     }
 
-    pub(super) fn imu(&mut self, reading: &ImuReading) {
+    /// A reading of the IMU, and whether it came from the source that was named.
+    pub(super) fn imu(&mut self, reading: &ImuReading, from_source: bool) {
+        if from_source {
+            self.heard = self.heard.max(Some(reading.time));
+        }
         self.imu.heard = Some(reading.time);
         self.imu.rate.add(reading.time, 1.0);
         if reading.temperature_c.is_some() {
@@ -97,6 +106,16 @@ impl Tally {
     pub(super) fn tick(&mut self, tick: &Tick) {
         // The ticks that it covers are left out; it is itself the one that came late.
         self.counters.late += u64::from(tick.skipped > 0);
+    }
+
+    /// By how much a thread of this program comes late just now.
+    pub(super) fn lateness(&mut self, now: Duration, late: Duration) {
+        self.lateness.add(now, late);
+    }
+
+    /// The greatest lateness of the last second.
+    pub(super) fn greatest_lateness(&mut self, now: Duration) -> Duration {
+        self.lateness.of_last_second(now)
     }
 
     pub(super) fn lost(&mut self, count: u64) {
@@ -127,20 +146,18 @@ impl Tally {
     pub(super) fn row(&self, sample: &Sample) -> Row {
         let [left, right] = &self.motors;
         let voltage = |motor: &MotorTally| motor.status.health.map(|health| health.voltage_v);
+        let round_trip = |motor: &MotorTally| motor.status.health?.round_trip;
         Row {
             sample: *sample,
             motor_temperature_c: [left.status.temperature_c, right.status.temperature_c],
             bus_voltage_v: voltage(left).or_else(|| voltage(right)),
+            round_trip_s: round_trip(left).max(round_trip(right)).map(|time| time.as_secs_f64()),
         }
     }
 
-    /// When anything was heard last.
+    /// When the robot was last heard through the source that was named.
     pub(super) fn heard(&self) -> Option<Duration> {
-        Motor::BOTH
-            .into_iter()
-            .filter_map(|motor| self.motors[motor as usize].heard)
-            .chain(self.imu.heard)
-            .max()
+        self.heard
     }
 
     pub(super) fn counters(&mut self, now: Duration, unrecorded: u64) -> Counters {

@@ -89,12 +89,19 @@ impl Source {
         }
     }
 
-    /// Bit rate of the bus, bit/s, where it is known.
+    /// Bit rate of the bus, bit/s; `None` of a recording. A virtual interface has none and is taken for a motor's bus as
+    /// delivered.
     pub(super) fn bit_rate(&self) -> Option<u32> {
         match self {
             Self::Slcan { bit_rate, .. } => Some(*bit_rate),
             Self::Emulated => Some(DEFAULT_BIT_RATE),
-            Self::Can { .. } | Self::Replay { .. } => None,
+            #[cfg(target_os = "linux")]
+            Self::Can { interface } => {
+                Some(crate::device::interfaces::bit_rate(interface).unwrap_or(DEFAULT_BIT_RATE))
+            }
+            #[cfg(not(target_os = "linux"))]
+            Self::Can { .. } => Some(DEFAULT_BIT_RATE),
+            Self::Replay { .. } => None,
         }
     }
 }
@@ -270,7 +277,7 @@ impl EventKind {
 }
 
 /// How everything stands.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Status {
     /// Time of the session, or of the recording that is replayed.
     pub time: Duration,
@@ -291,11 +298,12 @@ pub struct Status {
 }
 
 /// Whether frames come.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub enum Connection {
-    /// Open, and frames are heard.
+    /// Open, and the robot is heard through the source that was named; its IMU on a line of its own does not count.
+    #[default]
     Connected,
-    /// Open, but nothing has been heard for a second.
+    /// Open, but nothing has been heard yet, or for a second.
     Silent {
         /// What may be wrong, and the mend.
         hint: String,
@@ -363,7 +371,8 @@ pub struct Counters {
     pub sent: u64,
     /// Frames a second from the bus, over the last second.
     pub received_hz: f64,
-    /// Share of the bus that frames took over the last second, stuffing included; none without a bit rate.
+    /// Fraction of the bus that frames took over the last second, stuffing included: at the interface's bit rate, or at
+    /// 1 Mbit/s where a virtual interface has none; `None` of a recording.
     pub bus_load: Option<f64>,
     /// Frames that the system or the adapter dropped before they were read.
     pub dropped: u64,
@@ -407,12 +416,24 @@ pub struct RecordingStatus {
     pub file: PathBuf,
     /// Rows written.
     pub rows: u64,
+    /// Rows of the robot log that were handed over and are not in the file: final once the recording has ended, zero
+    /// while it goes on.
+    pub rows_lost: u64,
     /// Frames written.
     pub frames: u64,
     /// Bytes of both files.
     pub bytes: u64,
     /// Why it has ended early: disk full, for instance.
     pub problem: Option<String>,
+}
+
+/// What a session has come to.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Ending {
+    /// Whether the motors have confirmed that they are off, or were never switched on.
+    pub motors_off: bool,
+    /// The recording that was being made, complete, if one was.
+    pub recording: Option<RecordingStatus>,
 }
 
 #[cfg(test)]

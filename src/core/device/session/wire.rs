@@ -7,8 +7,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{Builder, JoinHandle};
 use std::time::Duration;
 
+use crate::device::stop::StopLine;
 use crate::device::{BusHealth, BusPair, BusState, Clock, ImuPort, hurry};
-use crate::link::{Bus, Frame, StampedFrame};
+use crate::link::{Bus, Direction, Frame, StampedFrame};
 
 /// Longest time that a thread waits before it looks whether it is to end.
 const WAIT: Duration = Duration::from_millis(50);
@@ -16,13 +17,15 @@ const WAIT: Duration = Duration::from_millis(50);
 const AFTER_ERROR: Duration = Duration::from_millis(100);
 /// Frames that wait for the control loop at most; beyond it has stopped taking them.
 const INBOX_FRAMES: usize = 200_000;
-/// Chunks of the IMU's bytes that wait for it at most.
-const INBOX_CHUNKS: usize = 20_000;
+/// Bytes of the IMU that wait for it at most: a minute.
+const INBOX_BYTES: usize = 1 << 19;
 /// Frames that wait for being sent: some 20 ms of a driven robot.
 const OUTBOX_FRAMES: usize = 64;
-/// After this time without a frame to send, the control loop of motors with torque is taken as dead, and the motors
-/// are switched off; again after as long, until it says that they are off.
-const CONTROL_TIMEOUT: Duration = Duration::from_millis(100);
+/// Time without a frame to send after which the sending thread looks whether a requested stop was obeyed.
+const HEARTBEAT: Duration = Duration::from_millis(10);
+/// After so many heartbeats without a frame to send, the control loop of motors with torque is taken as dead, and the
+/// motors are switched off; again after as long, until it says that they are off.
+const DEAD_AFTER: u32 = 10;
 /// Times that the motors are switched off where the control loop has ended without doing so, and the pause between.
 const LAST_TRIES: u32 = 5;
 const LAST_PAUSE: Duration = Duration::from_millis(5);
@@ -32,18 +35,57 @@ const REFUSED_IN_A_ROW: u64 = 20;
 /// What has come since it was last taken.
 #[derive(Default)]
 pub(super) struct Inbox {
+    /// Frames that were written to the bus, with the time of it.
+    pub(super) sent: Vec<StampedFrame>,
     pub(super) frames: Vec<StampedFrame>,
-    /// Bytes of the IMU with the time at which they were read.
-    pub(super) imu: Vec<(Duration, Vec<u8>)>,
+    pub(super) imu: ImuChunks,
     /// Frames that did not fit.
     pub(super) lost: u64,
+}
+
+impl Inbox {
+    pub(super) fn clear(&mut self) {
+        self.sent.clear();
+        self.frames.clear();
+        self.imu.clear();
+        self.lost = 0;
+    }
+}
+
+/// Bytes of the IMU with the times at which they were read, in one piece of memory that is kept.
+#[derive(Default)]
+pub(super) struct ImuChunks {
+    bytes: Vec<u8>,
+    /// When each chunk was read, and where it ends.
+    ends: Vec<(Duration, usize)>,
+}
+
+impl ImuChunks {
+    pub(super) fn push(&mut self, time: Duration, bytes: &[u8]) {
+        self.bytes.extend_from_slice(bytes);
+        self.ends.push((time, self.bytes.len()));
+    }
+
+    pub(super) fn iter(&self) -> impl Iterator<Item = (Duration, &[u8])> {
+        let mut start = 0;
+        self.ends.iter().map(move |&(time, end)| (time, &self.bytes[std::mem::replace(&mut start, end)..end]))
+    }
+
+    fn clear(&mut self) {
+        self.bytes.clear();
+        self.ends.clear();
+    }
 }
 
 /// What the threads share.
 #[derive(Default)]
 struct Shared {
     inbox: Mutex<Inbox>,
+    /// Frames that were written to the bus since they were last taken.
+    sent: Mutex<Vec<StampedFrame>>,
     imu_problem: Mutex<Option<String>>,
+    /// Frames that the sending thread has taken from its queue, sent or not.
+    handled: AtomicU64,
     /// Frames in a row that were not sent.
     refused: AtomicU64,
     /// Whether the motors may have torque.
@@ -64,28 +106,67 @@ struct Outgoing {
     frame: Frame,
 }
 
+/// Frames that were handed to the sending thread, and since when the oldest one waits.
+#[derive(Default)]
+struct Backlog {
+    handed: u64,
+    newest_at: Duration,
+    /// Number of a frame that had not been sent when it was looked at, and when it was handed over.
+    waiting: (u64, Duration),
+}
+
+impl Backlog {
+    fn hand_over(&mut self, now: Duration, handled: u64) {
+        if handled == self.handed {
+            self.waiting = (self.handed + 1, now);
+        }
+        self.handed += 1;
+        self.newest_at = now;
+    }
+
+    /// For how long a frame has been waiting for the sending thread.
+    fn age(&mut self, now: Duration, handled: u64) -> Duration {
+        if handled >= self.handed {
+            return Duration::ZERO;
+        }
+        if handled >= self.waiting.0 {
+            self.waiting = (self.handed, self.newest_at);
+        }
+        now.saturating_sub(self.waiting.1)
+    }
+}
+
 /// A real link in operation.
 pub(super) struct Wire {
     shared: Arc<Shared>,
     health: Arc<BusHealth>,
     outbox: Option<SyncSender<Outgoing>>,
+    backlog: Backlog,
     sender: Option<JoinHandle<()>>,
     readers: Vec<JoinHandle<()>>,
 }
 
 impl Wire {
     /// Starts the threads. Without a writer nothing can ever be sent. `farewell` switches the motors off; the
-    /// sending thread does so by itself where the control loop no longer hands it anything.
+    /// sending thread does so by itself where the control loop no longer hands it anything, or does not obey a request
+    /// on `stop_line`.
     pub(super) fn start(
         clock: Clock,
         bus: BusPair,
         imu: Option<ImuPort>,
         farewell: Vec<Frame>,
+        stop_line: Arc<StopLine>,
     ) -> std::io::Result<Self> {
         let BusPair { reader, writer, health } = bus;
         let shared = Arc::new(Shared::default());
-        let mut wire =
-            Self { shared: Arc::clone(&shared), health, outbox: None, sender: None, readers: Vec::new() };
+        let mut wire = Self {
+            shared: Arc::clone(&shared),
+            health,
+            outbox: None,
+            backlog: Backlog::default(),
+            sender: None,
+            readers: Vec::new(),
+        };
         let of_reader = Arc::clone(&shared);
         wire.readers.push(spawn("can-in", move || read_bus(reader, &clock, &of_reader))?);
         if let Some(port) = imu {
@@ -94,29 +175,37 @@ impl Wire {
         }
         if let Some(writer) = writer {
             let (outbox, frames) = sync_channel(OUTBOX_FRAMES);
-            let sender = Sender { writer, clock, shared, farewell };
+            let sender = Sender { writer, clock, shared, farewell, stop_line };
             wire.sender = Some(spawn("can-out", move || sender.work(&frames))?);
             wire.outbox = Some(outbox);
         }
         Ok(wire)
     }
 
-    /// Takes what has come; `into` is emptied first.
+    /// Takes what has come and what was sent; `into` is emptied first.
     pub(super) fn collect(&self, into: &mut Inbox) {
-        into.frames.clear();
-        into.imu.clear();
-        into.lost = 0;
+        into.clear();
         std::mem::swap(into, &mut locked(&self.shared.inbox));
+        // After the replies, so that the command of each of them is among these or was taken before.
+        std::mem::swap(&mut into.sent, &mut locked(&self.shared.sent));
     }
 
     /// Hands a frame to the sending thread; `false` where its queue is full.
-    pub(super) fn send(&self, frame: Frame) -> bool {
+    pub(super) fn send(&mut self, now: Duration, frame: Frame) -> bool {
         let outgoing = Outgoing { stops: self.shared.stops.load(Ordering::Acquire), frame };
+        let handled = self.shared.handled.load(Ordering::Acquire);
         let taken = self.outbox.as_ref().is_some_and(|outbox| outbox.try_send(outgoing).is_ok());
-        if !taken {
+        if taken {
+            self.backlog.hand_over(now, handled);
+        } else {
             self.shared.refused.fetch_add(1, Ordering::Relaxed);
         }
         taken
+    }
+
+    /// For how long a frame has been waiting to be sent, because the sending thread comes late.
+    pub(super) fn backlog(&mut self, now: Duration) -> Duration {
+        self.backlog.age(now, self.shared.handled.load(Ordering::Acquire))
     }
 
     /// Tells the sending thread whether the motors may have torque.
@@ -127,6 +216,14 @@ impl Wire {
     /// Frames that still wait are not sent any more: the robot is stopped.
     pub(super) fn forget_waiting(&self) {
         self.shared.stops.fetch_add(1, Ordering::AcqRel);
+    }
+
+    /// Sends what waits, and nothing from then on. [`Wire::collect`] then gives the last frames.
+    pub(super) fn finish_sending(&mut self) {
+        self.outbox = None;
+        if let Some(sender) = self.sender.take() {
+            join(sender);
+        }
     }
 
     /// Why the bus does not work just now.
@@ -151,16 +248,16 @@ impl Wire {
 
 impl Drop for Wire {
     fn drop(&mut self) {
-        // The sending thread ends once it has sent what is left; only then is the bus closed.
-        self.outbox = None;
-        let join = |thread: JoinHandle<()>| {
-            // One that panicked has ended as well.
-            thread.join().unwrap_or(());
-        };
-        self.sender.take().map(join);
+        // Only once the sending thread has ended is the bus closed.
+        self.finish_sending();
         self.shared.ends.store(true, Ordering::Relaxed);
         self.readers.drain(..).for_each(join);
     }
+}
+
+fn join(thread: JoinHandle<()>) {
+    // One that panicked has ended as well.
+    thread.join().unwrap_or(());
 }
 
 /// A thread that is as urgent as the control loop's.
@@ -202,8 +299,8 @@ fn read_imu(mut port: ImuPort, clock: &Clock, shared: &Shared) {
             Ok(count) => {
                 if count > 0 {
                     let mut inbox = locked(&shared.inbox);
-                    if inbox.imu.len() < INBOX_CHUNKS {
-                        inbox.imu.push((clock.now(), bytes[..count].to_vec()));
+                    if inbox.imu.bytes.len() < INBOX_BYTES {
+                        inbox.imu.push(clock.now(), &bytes[..count]);
                     } else {
                         inbox.lost += 1;
                     }
@@ -218,25 +315,39 @@ fn read_imu(mut port: ImuPort, clock: &Clock, shared: &Shared) {
     }
 }
 
+/// Whether a control loop that has handed over nothing for so many heartbeats is to be taken as hanging just now.
+fn hangs(stop_is_pending: bool, heartbeats: u32) -> bool {
+    stop_is_pending || heartbeats.is_multiple_of(DEAD_AFTER)
+}
+
 /// The sending thread: the only one that ever writes to the bus.
 struct Sender {
     writer: Box<dyn Bus>,
     clock: Clock,
     shared: Arc<Shared>,
     farewell: Vec<Frame>,
+    stop_line: Arc<StopLine>,
 }
 
 impl Sender {
     fn work(mut self, outgoing: &Receiver<Outgoing>) {
+        let mut heartbeats = 0;
         loop {
-            match outgoing.recv_timeout(CONTROL_TIMEOUT) {
-                Ok(Outgoing { stops, frame }) if stops == self.shared.stops.load(Ordering::Acquire) => {
-                    self.send(&frame);
+            match outgoing.recv_timeout(HEARTBEAT) {
+                Ok(Outgoing { stops, frame }) => {
+                    heartbeats = 0;
+                    // Frames from before a stop are dropped.
+                    if stops == self.shared.stops.load(Ordering::Acquire) {
+                        self.send(&frame);
+                    }
+                    self.shared.handled.fetch_add(1, Ordering::AcqRel);
                 }
-                // From before a stop.
-                Ok(_) => {}
-                Err(RecvTimeoutError::Timeout) if self.is_hot() => self.switch_off(),
-                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Timeout) => {
+                    heartbeats += 1;
+                    if self.is_hot() && hangs(self.stop_line.pending().is_some(), heartbeats) {
+                        self.switch_off();
+                    }
+                }
                 Err(RecvTimeoutError::Disconnected) => break,
             }
         }
@@ -251,8 +362,15 @@ impl Sender {
     }
 
     fn send(&mut self, frame: &Frame) {
-        match self.writer.send(self.clock.now(), frame) {
-            Ok(()) => self.shared.refused.store(0, Ordering::Relaxed),
+        let time = self.clock.now();
+        match self.writer.send(time, frame) {
+            Ok(()) => {
+                self.shared.refused.store(0, Ordering::Relaxed);
+                let mut sent = locked(&self.shared.sent);
+                if sent.len() < INBOX_FRAMES {
+                    sent.push(StampedFrame { time, direction: Direction::Sent, frame: *frame });
+                }
+            }
             Err(_) => {
                 self.shared.refused.fetch_add(1, Ordering::Relaxed);
             }
@@ -268,83 +386,4 @@ impl Sender {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::link::{BusError, FrameId};
-
-    /// Lets the test hold the sending thread in the middle of a frame.
-    #[derive(Clone, Default)]
-    struct Held {
-        gate: Arc<Mutex<()>>,
-        sent: Arc<Mutex<Vec<u8>>>,
-    }
-
-    impl Bus for Held {
-        fn send(&mut self, _: Duration, frame: &Frame) -> Result<(), BusError> {
-            locked(&self.sent).push(frame.bytes()[0]);
-            drop(locked(&self.gate));
-            Ok(())
-        }
-
-        fn receive(&mut self, _: Duration) -> Result<Option<StampedFrame>, BusError> {
-            Ok(None)
-        }
-
-        fn wait(&mut self, _: Duration) -> Result<(), BusError> {
-            std::thread::sleep(Duration::from_millis(1));
-            Ok(())
-        }
-    }
-
-    fn frame(first: u8) -> Frame {
-        Frame::full(FrameId::Standard(0x141), [first, 0, 0, 0, 0, 0, 0, 0])
-    }
-
-    fn wire(bus: &Held) -> Wire {
-        let health = Arc::new(BusHealth::default());
-        let pair = BusPair { reader: Box::new(bus.clone()), writer: Some(Box::new(bus.clone())), health };
-        Wire::start(Clock::start(), pair, None, vec![frame(0x80)]).unwrap()
-    }
-
-    #[test]
-    fn torques_from_before_a_stop_are_not_sent_after_it() {
-        let bus = Held::default();
-        let gate = locked(&bus.gate);
-        let wire = wire(&bus);
-        for torque in 1..=5 {
-            assert!(wire.send(frame(torque)));
-        }
-        while locked(&bus.sent).is_empty() {
-            std::thread::yield_now();
-        }
-        wire.forget_waiting();
-        assert!(wire.send(frame(0x81)));
-        drop(gate);
-        drop(wire);
-        assert_eq!(*locked(&bus.sent), [1, 0x81]);
-    }
-
-    #[test]
-    fn motors_with_torque_are_switched_off_at_the_end_and_others_are_left_alone() {
-        for (hot, expected) in [(true, vec![0x80; LAST_TRIES as usize]), (false, vec![])] {
-            let bus = Held::default();
-            let wire = wire(&bus);
-            wire.set_hot(hot);
-            drop(wire);
-            assert_eq!(*locked(&bus.sent), expected);
-        }
-    }
-
-    #[test]
-    fn where_the_control_loop_hangs_motors_with_torque_are_switched_off_again_and_again() {
-        let bus = Held::default();
-        let wire = wire(&bus);
-        wire.set_hot(true);
-        while locked(&bus.sent).len() < 2 {
-            std::thread::yield_now();
-        }
-        wire.set_hot(false);
-        drop(wire);
-        assert!(locked(&bus.sent).iter().all(|first| *first == 0x80));
-    }
-}
+mod tests;

@@ -1,6 +1,7 @@
 //! The control loop's thread: everything that was heard goes in, everything that is sent or shown comes out.
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError};
 use std::time::Duration;
 
@@ -9,8 +10,9 @@ use super::link::{Heard, Link};
 use super::publisher::Publisher;
 use super::recording::Recording;
 use super::tally::Tally;
-use super::types::{Connection, DriveStatus, Event, EventKind, SessionOrder, Status, Timing};
-use crate::control::drive::{Drive, DriveEvent, DriveOrder, Inputs, Listener, Output, Stage};
+use super::types::{Connection, DriveStatus, Ending, Event, EventKind, SessionOrder, Status, Timing};
+use crate::control::drive::{Drive, DriveEvent, DriveOrder, Inputs, Listener, Output, Stage, StopReason};
+use crate::device::stop::StopLine;
 use crate::device::{Pacer, Priority, Recorder};
 use crate::link::{Direction, MotorEvent, MotorOrder, StampedFrame};
 use crate::record::Sample;
@@ -23,6 +25,10 @@ const SILENT: Duration = Duration::from_secs(1);
 /// Longest time for which the motors are told to switch off when a session ends; an adapter that was lost needs some to
 /// come back.
 const FAREWELL: Duration = Duration::from_secs(2);
+
+/// Lateness from which on this computer, and not the robot, is taken for the cause of a silence: half of the time that a
+/// motor may be silent.
+const BUSY: Duration = Duration::from_millis(10);
 
 /// What the samples are made by.
 pub(super) enum Role {
@@ -40,13 +46,21 @@ pub(super) struct Worker {
     pub(super) tally: Tally,
     pub(super) recording: Recording,
     pub(super) orders: Receiver<SessionOrder>,
+    pub(super) stop_line: Arc<StopLine>,
     pub(super) drive_orders: Vec<DriveOrder>,
     pub(super) publisher: Publisher,
 }
 
+impl Drop for Worker {
+    fn drop(&mut self) {
+        self.link.finish_sending();
+        self.stop_line.end();
+    }
+}
+
 impl Worker {
     /// Until the session's handle is dropped.
-    pub(super) fn work(mut self, priority: Priority) {
+    pub(super) fn work(mut self, priority: Priority) -> Ending {
         if let (Priority::Usual(reason), Role::Drive(_)) = (priority, &self.role) {
             self.note(self.pacer.now(), EventKind::Warning, reason);
         }
@@ -63,7 +77,20 @@ impl Worker {
             }
         }
         self.farewell();
-        self.recording.end();
+        // The last frames, which only then are known to have been sent.
+        self.link.finish_sending();
+        self.link.collect(self.pacer.now(), &mut self.heard);
+        self.hear_all();
+        self.end()
+    }
+
+    /// Completes the recording.
+    pub(super) fn end(&mut self) -> Ending {
+        let motors_off = match &self.role {
+            Role::Listen(_) => true,
+            Role::Drive(drive) => !is_hot(drive),
+        };
+        Ending { motors_off, recording: self.recording.end() }
     }
 
     pub(super) fn take_orders(&mut self, now: Duration) -> ControlFlow<()> {
@@ -100,19 +127,20 @@ impl Worker {
     fn listen(&mut self, now: Duration) {
         self.drive_orders.clear();
         let inbox = std::mem::take(&mut self.heard.inbox);
+        inbox.sent.iter().for_each(|frame| self.hear_sent(frame));
         let mut imu = inbox.imu.iter().peekable();
         let mut slice_end = None;
         for frame in &inbox.frames {
             while let Some((time, bytes)) = imu.next_if(|(time, _)| *time <= frame.time) {
-                self.slice(&mut slice_end, *time);
-                self.hear_imu(*time, bytes);
+                self.slice(&mut slice_end, time);
+                self.hear_imu(time, bytes);
             }
             self.slice(&mut slice_end, frame.time);
             self.hear_frame(frame);
         }
         for (time, bytes) in imu {
-            self.slice(&mut slice_end, *time);
-            self.hear_imu(*time, bytes);
+            self.slice(&mut slice_end, time);
+            self.hear_imu(time, bytes);
         }
         self.sample(now);
         self.heard.inbox = inbox;
@@ -170,11 +198,34 @@ impl Worker {
         self.publisher.samples.push(row.sample);
     }
 
-    fn drive(&mut self, now: Duration, late: Duration) {
+    /// A frame that was written to the bus.
+    fn hear_sent(&mut self, frame: &StampedFrame) {
+        self.hearing.sent(frame);
+        self.tally.frame(frame);
+        if let Some(recorder) = &self.recording.input {
+            recorder.frame(frame);
+        }
+        self.publisher.frame(*frame);
+    }
+
+    /// Takes all that was sent and heard since the last tick; the commands first, for the replies are told by them.
+    fn hear_all(&mut self) {
         let inbox = std::mem::take(&mut self.heard.inbox);
+        inbox.sent.iter().for_each(|frame| self.hear_sent(frame));
         inbox.frames.iter().for_each(|frame| self.hear_frame(frame));
-        inbox.imu.iter().for_each(|(time, bytes)| self.hear_imu(*time, bytes));
+        inbox.imu.iter().for_each(|(time, bytes)| self.hear_imu(time, bytes));
         self.heard.inbox = inbox;
+    }
+
+    fn drive(&mut self, now: Duration, late: Duration) {
+        self.hear_all();
+        let stop = self.stop_line.pending();
+        if stop.is_some() {
+            self.drive_orders.insert(0, DriveOrder::Stop);
+        }
+        // A motor cannot answer a command that still waits for the sending thread.
+        let late = late.max(self.link.backlog(now));
+        self.tally.lateness(now, late);
         let bus_down = self.link.problem().is_some();
         let Role::Drive(drive) = &mut self.role else { return };
         let inputs = Inputs {
@@ -185,13 +236,14 @@ impl Worker {
             late,
         };
         let output = drive.step(now, &inputs);
-        let hot = match drive.stage() {
-            Stage::Listening | Stage::Checking => false,
-            Stage::Driving | Stage::Stopped(_) => !drive.has_ended(),
-        };
+        let hot = is_hot(drive);
         self.drive_orders.clear();
         self.link.set_hot(hot);
         self.obey(now, &output);
+        self.stop_line.set_motors_on(hot);
+        if let Some(stop) = stop {
+            self.stop_line.obeyed(stop);
+        }
     }
 
     fn obey(&mut self, now: Duration, output: &Output) {
@@ -214,16 +266,40 @@ impl Worker {
                 DriveEvent::Warning(_) => EventKind::Warning,
             };
             self.note(now, kind, event.to_string());
+            if let DriveEvent::Stage(Stage::Stopped(reason)) = event {
+                self.explain_delay(now, reason);
+            }
         }
+    }
+
+    /// Says of a stop for silence or lateness whether this program came late itself.
+    fn explain_delay(&mut self, now: Duration, reason: &StopReason) {
+        if !matches!(
+            reason,
+            StopReason::MotorSilent { .. } | StopReason::ImuSilent { .. } | StopReason::Late { .. }
+        ) {
+            return;
+        }
+        let greatest = self.tally.greatest_lateness(now);
+        let greatest_ms = 1e3 * greatest.as_secs_f64();
+        let whose = if greatest < BUSY {
+            "the delay is not of this program: look at the robot, its adapter and cables"
+        } else {
+            "this computer was too busy: close other programs"
+        };
+        let text = format!(
+            "in the second before the stop, the control loop and the sending thread came at most {greatest_ms:.1} ms \
+             late: {whose}"
+        );
+        self.note(now, EventKind::Note, text);
     }
 
     fn send(&mut self, now: Duration, order: &MotorOrder) {
         for frame in self.hearing.wheels.frames(order) {
-            if !self.link.send(now, frame) {
-                continue;
+            if self.link.send(now, frame) {
+                // Before its reply is there, however late it is heard that the frame was sent.
+                self.hearing.sent(&StampedFrame { time: now, direction: Direction::Sent, frame });
             }
-            let sent = StampedFrame { time: now, direction: Direction::Sent, frame };
-            self.hear_frame(&sent);
         }
         if matches!(order, MotorOrder::Torque(_) | MotorOrder::ReadState) {
             self.tally.asked();
@@ -247,37 +323,45 @@ impl Worker {
 
     fn publish(&mut self, now: Duration) {
         self.poll_recording(now);
-        let status = self.status(now);
-        let lost = self.publisher.publish(status);
+        let [dropped, errors, reconnects] = self.link.losses();
+        self.tally.bus(dropped, errors, reconnects);
+        let connection = self.connection(now);
+        let Self { role, tally, recording, pacer, publisher, .. } = self;
+        let lost = publisher.publish(recording.input.clone(), |status| {
+            status.time = now;
+            status.connection = connection;
+            if let Role::Drive(drive) = role {
+                let (stage, motors_off) = (drive.stage(), drive.has_ended());
+                let empty = || DriveStatus { stage, motors_off, checks: Vec::new() };
+                let shown = status.drive.get_or_insert_with(empty);
+                (shown.stage, shown.motors_off) = (stage, motors_off);
+                // While the robot is driven they stay as they are, and need no new memory.
+                if shown.checks != drive.checks() {
+                    shown.checks = drive.checks().to_vec();
+                }
+            }
+            status.motors = tally.motor_status(now);
+            status.imu = tally.imu_status(now);
+            status.counters = tally.counters(now, recording.recorder.as_ref().map_or(0, Recorder::lost));
+            pacer.fill_timing(&mut status.timing);
+        });
         self.tally.lost(lost);
     }
 
-    /// How everything stands.
+    /// How a replay stands.
     pub(super) fn status(&mut self, now: Duration) -> Status {
         let [dropped, errors, reconnects] = self.link.losses();
         self.tally.bus(dropped, errors, reconnects);
         Status {
             time: now,
             connection: self.connection(now),
-            drive: match &self.role {
-                Role::Listen(_) => None,
-                Role::Drive(drive) => Some(DriveStatus {
-                    stage: drive.stage(),
-                    motors_off: drive.has_ended(),
-                    checks: drive.checks().to_vec(),
-                }),
-            },
+            drive: None,
             motors: self.tally.motor_status(now),
             imu: self.tally.imu_status(now),
             counters: self.tally.counters(now, self.recording.recorder.as_ref().map_or(0, Recorder::lost)),
-            timing: self.timing(),
+            timing: Timing::default(),
             recording: self.recording.recorder.as_ref().map(Recorder::status),
         }
-    }
-
-    /// Of the control loop, which a recording has not.
-    fn timing(&self) -> Timing {
-        if matches!(self.link, Link::Replay(_)) { Timing::default() } else { self.pacer.timing() }
     }
 
     fn connection(&self, now: Duration) -> Connection {
@@ -287,8 +371,10 @@ impl Worker {
         if let Some(reason) = self.link.problem() {
             return Connection::Lost { reason };
         }
-        let heard = self.tally.heard().unwrap_or_default();
-        if now < heard + SILENT { Connection::Connected } else { Connection::Silent { hint: self.hint() } }
+        match self.tally.heard() {
+            Some(heard) if now < heard + SILENT => Connection::Connected,
+            _ => Connection::Silent { hint: self.hint() },
+        }
     }
 
     fn hint(&self) -> String {
@@ -306,23 +392,26 @@ impl Worker {
         }
     }
 
-    /// Stops the motors before the link is closed.
+    /// Stops the motors before the link is closed, if they were switched on here.
     fn farewell(&mut self) {
-        let Role::Drive(drive) = &self.role else { return };
-        if matches!(drive.stage(), Stage::Listening) {
-            return;
-        }
-        self.drive_orders.push(DriveOrder::Stop);
+        self.stop_line.request();
         let ticks = (FAREWELL.as_nanos() / TICK.as_nanos()) as u64;
         for _ in 0..ticks {
+            match &self.role {
+                Role::Drive(drive) if is_hot(drive) => {}
+                Role::Drive(_) | Role::Listen(_) => break,
+            }
             let tick = self.pacer.wait();
             let now = tick.due + tick.late;
             self.tick(now, Duration::ZERO);
-            if let Role::Drive(drive) = &self.role
-                && drive.has_ended()
-            {
-                break;
-            }
         }
+    }
+}
+
+/// Whether the motors were switched on here and have not confirmed that they are off.
+fn is_hot(drive: &Drive) -> bool {
+    match drive.stage() {
+        Stage::Listening | Stage::Checking => false,
+        Stage::Driving | Stage::Stopped(_) => !drive.has_ended(),
     }
 }

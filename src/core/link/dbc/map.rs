@@ -148,7 +148,15 @@ impl SignalMap {
         }
         let [left, right] = Motor::BOTH.map(|motor| self.motor(motor, time, motors[motor as usize]));
         let imu = self.pitch.hear(time, pitch).map(|[pitch_rad, pitch_rate_rad_s]| {
-            Heard::Imu(ImuReading { time, pitch_rad, pitch_rate_rad_s, tilt_rad: None, temperature_c: None })
+            let (tilt_rad, yaw_rate_rad_s, temperature_c) = (None, None, None);
+            Heard::Imu(ImuReading {
+                time,
+                pitch_rad,
+                pitch_rate_rad_s,
+                tilt_rad,
+                yaw_rate_rad_s,
+                temperature_c,
+            })
         });
         [left, right, imu].into_iter().flatten()
     }

@@ -27,8 +27,28 @@ pub enum Fault {
     ImuSilent,
     /// The IMU sends the same plausible reading again and again.
     ImuFrozen,
+    /// The IMU's angles do not change any more; its rates and accelerations do.
+    ImuAngleFrozen,
+    /// The IMU's rates are 0; its angles and accelerations are right.
+    ImuRateZero,
+    /// The IMU's pitch is off by an angle, rad.
+    ImuAngleOff(f64),
     /// The IMU works again.
     ImuReturns,
+    /// A motor answers with the same encoder reading and speed 0, and gives torque.
+    EncoderFrozen(Motor),
+    /// Its encoder works again.
+    EncoderReturns(Motor),
+    /// A motor gives the opposite of the torque that is commanded, from now on or not any more.
+    TorqueReversed(Motor),
+    /// Each motor gives the torque that is commanded of the other, from now on or not any more.
+    TorquesSwapped,
+    /// Another controller sends a motor this command once, with its other bytes 0.
+    Commanded(Motor, u8),
+    /// Somebody holds the robot where it is, in place of the hand that lets it go.
+    Held,
+    /// It is let go.
+    Released,
     /// The bus is off: no frame gets through, and motors keep their last torque.
     BusOff,
     /// The bus works again.
@@ -55,7 +75,9 @@ pub struct TimedFault {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "no fault is written `{text}`: give FAULT@SECONDS with one of {{left|right}}-vanishes, -returns, -errors=BITS, \
-     -temperature=C, or voltage=V, imu-silent, imu-frozen, imu-returns, bus-off, bus-on, push=N"
+     -temperature=C, -encoder-frozen, -encoder-returns, -torque-reversed, -commanded=BYTE, or voltage=V, imu-silent, \
+     imu-frozen, imu-angle-frozen, imu-rate-zero, imu-angle-off=RAD, imu-returns, torques-swapped, held, released, \
+     bus-off, bus-on, push=N"
 )]
 pub struct FaultError {
     text: String,
@@ -80,12 +102,14 @@ fn fault_of(text: &str) -> Option<Fault> {
     let given = |name: &str| -> Option<Fault> {
         Some(match name {
             "voltage" => Fault::Voltage(number()?),
+            "imu-angle-off" => Fault::ImuAngleOff(number()?),
             "push" => Fault::Push { force_n: number()?, duration_s: PUSH_S },
             _ => {
                 let (motor, what) = motor_of(name)?;
                 match what {
                     "errors" => Fault::MotorErrors(motor, MotorErrors(value?.parse().ok()?)),
                     "temperature" => Fault::MotorTemperature(motor, number()?),
+                    "commanded" => Fault::Commanded(motor, value?.parse().ok()?),
                     _ => return None,
                 }
             }
@@ -95,12 +119,20 @@ fn fault_of(text: &str) -> Option<Fault> {
         Some(match name {
             "imu-silent" => Fault::ImuSilent,
             "imu-frozen" => Fault::ImuFrozen,
+            "imu-angle-frozen" => Fault::ImuAngleFrozen,
+            "imu-rate-zero" => Fault::ImuRateZero,
             "imu-returns" => Fault::ImuReturns,
+            "torques-swapped" => Fault::TorquesSwapped,
+            "held" => Fault::Held,
+            "released" => Fault::Released,
             "bus-off" => Fault::BusOff,
             "bus-on" => Fault::BusOn,
             _ => match motor_of(name)? {
                 (motor, "vanishes") => Fault::MotorVanishes(motor),
                 (motor, "returns") => Fault::MotorReturns(motor),
+                (motor, "encoder-frozen") => Fault::EncoderFrozen(motor),
+                (motor, "encoder-returns") => Fault::EncoderReturns(motor),
+                (motor, "torque-reversed") => Fault::TorqueReversed(motor),
                 _ => return None,
             },
         })
@@ -131,6 +163,9 @@ mod tests {
             ("left-temperature=95@1", 1.0, Fault::MotorTemperature(Motor::Left, 95.0)),
             ("voltage=18.5@3", 3.0, Fault::Voltage(18.5)),
             ("imu-frozen@3", 3.0, Fault::ImuFrozen),
+            ("imu-angle-off=-0.2@3", 3.0, Fault::ImuAngleOff(-0.2)),
+            ("left-encoder-frozen@3", 3.0, Fault::EncoderFrozen(Motor::Left)),
+            ("right-commanded=129@3", 3.0, Fault::Commanded(Motor::Right, 0x81)),
             ("bus-off@3", 3.0, Fault::BusOff),
             ("push=-30@3", 3.0, Fault::Push { force_n: -30.0, duration_s: 0.1 }),
         ] {

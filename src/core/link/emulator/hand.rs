@@ -30,6 +30,7 @@ pub enum Place {
 pub(super) enum Hand {
     Rocks { since: u64 },
     Off,
+    Holds { state: State },
     LetsLie { pitch_rad: f64 },
     Carries { since: u64, from_pitch_rad: f64 },
 }
@@ -37,17 +38,23 @@ pub(super) enum Hand {
 impl Hand {
     pub(super) fn place(&self) -> Place {
         match self {
-            Self::Rocks { .. } => Place::Stand,
+            Self::Rocks { .. } | Self::Holds { .. } => Place::Stand,
             Self::Off => Place::Free,
             Self::LetsLie { .. } => Place::Lying,
             Self::Carries { .. } => Place::Carried,
         }
     }
 
+    /// Whether it holds the robot still and does not let go.
+    pub(super) fn holds(&self) -> bool {
+        matches!(self, Self::Holds { .. })
+    }
+
     /// Where the robot is held at a tick; nowhere if it is on its own.
     pub(super) fn state(&self, tick: u64, wheel_radius_m: f64) -> Option<State> {
         match *self {
             Self::Off => None,
+            Self::Holds { state } => Some(state),
             Self::Rocks { since } => {
                 let (sin, cos) = libm::sincos(TAU * (tick - since) as f64 / ROCKING_TICKS);
                 Some(State {

@@ -37,6 +37,9 @@ pub(super) enum Health {
     Well,
     Silent,
     Frozen,
+    AngleFrozen,
+    RateZero,
+    AngleOff(f64),
 }
 
 /// A JY901 on the body.
@@ -54,6 +57,8 @@ pub(super) struct EmulatedImu {
     registers: BTreeMap<u8, u16>,
     writes: RegisterWriteDecoder,
     health: Health,
+    /// Pitch when its health changed, rad.
+    last_pitch_rad: f64,
     packets: Vec<Packet>,
     outgoing: VecDeque<(Duration, Vec<u8>)>,
 }
@@ -72,13 +77,14 @@ impl EmulatedImu {
             registers: BTreeMap::new(),
             writes: RegisterWriteDecoder::default(),
             health: Health::Well,
+            last_pitch_rad: 0.0,
             packets: Vec::new(),
             outgoing: VecDeque::new(),
         }
     }
 
-    pub(super) fn set_health(&mut self, health: Health) {
-        self.health = health;
+    pub(super) fn set_health(&mut self, health: Health, pitch_rad: f64) {
+        (self.health, self.last_pitch_rad) = (health, pitch_rad);
     }
 
     /// Sends what is due at a tick.
@@ -89,8 +95,8 @@ impl EmulatedImu {
         if !due || self.health == Health::Silent {
             return;
         }
-        if self.health == Health::Well || self.packets.is_empty() {
-            self.packets = self.cycle(attitude);
+        if self.health != Health::Frozen || self.packets.is_empty() {
+            self.packets = self.cycle(&self.felt(attitude));
         }
         // A line that is too slow loses cycles.
         if tick >= self.line_free_tick {
@@ -149,6 +155,16 @@ impl EmulatedImu {
         let rate_hz = write.rate_hz()?;
         self.period_ticks = Some((1.0 / (rate_hz * TICK_S)).round() as u64);
         Some(rate_hz)
+    }
+
+    /// What it reports in place of the truth.
+    fn felt(&self, attitude: &Attitude) -> Attitude {
+        match self.health {
+            Health::AngleFrozen => Attitude { pitch_rad: self.last_pitch_rad, ..*attitude },
+            Health::RateZero => Attitude { pitch_rate_rad_s: 0.0, yaw_rate_rad_s: 0.0, ..*attitude },
+            Health::AngleOff(off_rad) => Attitude { pitch_rad: attitude.pitch_rad + off_rad, ..*attitude },
+            Health::Well | Health::Silent | Health::Frozen => *attitude,
+        }
     }
 
     fn cycle(&self, attitude: &Attitude) -> Vec<Packet> {

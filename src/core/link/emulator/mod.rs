@@ -95,6 +95,10 @@ pub struct Emulator {
     /// Faults to come, latest first.
     faults: Vec<TimedFault>,
     voltage_v: f64,
+    /// What motors with a frozen encoder report.
+    frozen: [Option<Shaft>; 2],
+    reversed: [bool; 2],
+    swapped: bool,
     bus_off: bool,
     tick: u64,
     last_driven_tick: u64,
@@ -141,6 +145,9 @@ impl Emulator {
             flood: Flood::new(settings.flood_hz, settings.seed),
             faults,
             voltage_v: SUPPLY_V,
+            frozen: [None; 2],
+            reversed: [false; 2],
+            swapped: false,
             bus_off: false,
             tick: 0,
             last_driven_tick: 0,
@@ -158,7 +165,7 @@ impl Emulator {
         while self.time() + tick_duration() <= now {
             let speeds = self.readings.motor_speed_rad_s;
             let asked_nm = [0, 1].map(|motor: usize| self.motors[motor].step(speeds[motor]));
-            self.move_on(asked_nm);
+            self.move_on(self.wired(asked_nm));
             self.tick += 1;
             self.begin_tick();
         }
@@ -207,9 +214,33 @@ impl Emulator {
             Fault::MotorErrors(motor, errors) => self.motors[motor as usize].set_causes(errors),
             Fault::MotorTemperature(motor, celsius) => self.motors[motor as usize].set_temperature_c(celsius),
             Fault::Voltage(voltage_v) => self.voltage_v = voltage_v,
-            Fault::ImuSilent => self.imu.set_health(Health::Silent),
-            Fault::ImuFrozen => self.imu.set_health(Health::Frozen),
-            Fault::ImuReturns => self.imu.set_health(Health::Well),
+            Fault::ImuSilent => self.imu_turns(Health::Silent),
+            Fault::ImuFrozen => self.imu_turns(Health::Frozen),
+            Fault::ImuAngleFrozen => self.imu_turns(Health::AngleFrozen),
+            Fault::ImuRateZero => self.imu_turns(Health::RateZero),
+            Fault::ImuAngleOff(off_rad) => self.imu_turns(Health::AngleOff(off_rad)),
+            Fault::ImuReturns => self.imu_turns(Health::Well),
+            Fault::EncoderFrozen(motor) => {
+                let shaft = self.shaft(motor as usize);
+                self.frozen[motor as usize] = Some(Shaft { speed_rad_s: 0.0, ..shaft });
+            }
+            Fault::EncoderReturns(motor) => self.frozen[motor as usize] = None,
+            Fault::TorqueReversed(motor) => self.reversed[motor as usize] ^= true,
+            Fault::TorquesSwapped => self.swapped ^= true,
+            Fault::Commanded(motor, command) => {
+                let frame = Frame::full(
+                    self.motors[motor as usize].id().command_id(),
+                    [command, 0, 0, 0, 0, 0, 0, 0],
+                );
+                self.put(self.time(), frame);
+                self.obey(self.time(), &frame);
+            }
+            Fault::Held => {
+                let Pose { state, .. } = self.robot.pose();
+                let state = State { x_dot_m_s: 0.0, pitch_rate_rad_s: 0.0, ..state };
+                self.hand = Hand::Holds { state };
+            }
+            Fault::Released => self.hand = Hand::Off,
             Fault::BusOff => self.bus_off = true,
             Fault::BusOn => self.bus_off = false,
             Fault::Push { force_n, duration_s } => self.push(force_n, duration_s),
@@ -249,6 +280,16 @@ impl Emulator {
         Duration::from_millis(self.tick)
     }
 
+    fn imu_turns(&mut self, health: Health) {
+        self.imu.set_health(health, self.readings.pitch_rad);
+    }
+
+    /// Torques as they act, by how the motors are wired.
+    fn wired(&self, [left, right]: [f64; 2]) -> [f64; 2] {
+        let torques = if self.swapped { [right, left] } else { [left, right] };
+        [0, 1].map(|motor: usize| if self.reversed[motor] { -torques[motor] } else { torques[motor] })
+    }
+
     fn move_on(&mut self, asked_nm: [f64; 2]) {
         self.change_hands();
         let Some(state) = self.hand.state(self.tick + 1, self.wheel_radius_m) else {
@@ -261,7 +302,7 @@ impl Emulator {
         };
         let before = self.robot.motor_angle_rad();
         self.robot.hold(asked_nm, &state);
-        if self.hand.place() != Place::Stand {
+        if self.hand.place() != Place::Stand || self.hand.holds() {
             for (motor, angle_rad) in self.robot.motor_angle_rad().into_iter().enumerate() {
                 self.carried_rad[motor] += before[motor] - angle_rad;
             }
@@ -274,7 +315,7 @@ impl Emulator {
         let quiet = self.tick - self.last_driven_tick >= hand::PATIENCE_TICKS;
         let off = !self.motors.iter().any(EmulatedMotor::works);
         match self.hand.place() {
-            Place::Stand if driven && !self.in_air => self.hand = Hand::Off,
+            Place::Stand if driven && !self.in_air && !self.hand.holds() => self.hand = Hand::Off,
             Place::Free | Place::Lying if quiet && (off || self.place() == Place::Lying) => {
                 self.motors.iter_mut().for_each(EmulatedMotor::rest);
                 let from_pitch_rad = self.robot.state().pitch_rad;
@@ -333,7 +374,7 @@ impl Emulator {
     }
 
     fn tell(&mut self, now: Duration, motor: usize, command: [u8; 8]) {
-        let shaft = self.shaft(motor);
+        let shaft = self.frozen[motor].unwrap_or_else(|| self.shaft(motor));
         let told = &mut self.motors[motor];
         let reply = told.answer(command, &shaft, self.voltage_v);
         if told.is_driven() {

@@ -80,7 +80,9 @@ impl Host {
                     MotorEvent::Acknowledged { motor, command, .. } => {
                         self.acknowledged.push((motor, command))
                     }
-                    MotorEvent::Asked { motor, current_a, .. } => self.asked_a[motor as usize] = current_a,
+                    MotorEvent::Commanded { motor, current_a, .. } => {
+                        self.asked_a[motor as usize] = current_a.unwrap_or(0.0);
+                    }
                     MotorEvent::TurnsLost { .. } => {}
                 }
             }

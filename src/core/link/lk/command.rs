@@ -214,6 +214,24 @@ impl Command {
         }
     }
 
+    /// Returns whether the motor only answers it and does nothing else.
+    pub fn is_query(&self) -> bool {
+        use ParameterAccess::{Read235, Read236, ReadAcceleration, ReadGains};
+        match self {
+            Self::ReadState1
+            | Self::ReadState2
+            | Self::ReadState3
+            | Self::Brake(Brake::Read)
+            | Self::ReadEncoder
+            | Self::ReadAngle
+            | Self::ReadTurnAngle => true,
+            Self::Parameters { access, .. } => {
+                matches!(access, Read236 | Read235 | ReadGains | ReadAcceleration)
+            }
+            _ => false,
+        }
+    }
+
     /// The 8 bytes.
     pub fn encode(&self) -> [u8; 8] {
         let (one, two, four) = self.fields();

@@ -118,6 +118,7 @@ fn health_follows_the_layout_of_the_firmware() {
         supply_current_a: Some(-0.35),
         on: Some(true),
         errors: MotorErrors(8),
+        round_trip: None,
     };
     assert_eq!(health, expected);
     assert_eq!(health.errors.to_string(), "motor too hot");
@@ -210,6 +211,7 @@ fn after_a_long_silence_the_angle_goes_on_from_the_last_one() {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Told {
     Asked(i16),
+    Commanded(u16),
     State(i16),
     Health,
     Acknowledged(u8),
@@ -221,7 +223,8 @@ fn told(wheels: &mut Wheels, frame: &StampedFrame, settings: &LinkSettings) -> T
     let raw = |current_a: f64| (current_a * settings.current_steps_per_a).round() as i16;
     match events.pop() {
         None => Told::Nothing,
-        Some(MotorEvent::Asked { current_a, .. }) => Told::Asked(raw(current_a)),
+        Some(MotorEvent::Commanded { current_a: Some(current_a), .. }) => Told::Asked(raw(current_a)),
+        Some(MotorEvent::Commanded { command, .. }) => Told::Commanded(command),
         Some(MotorEvent::State(_, state)) => Told::State(raw(state.current_a)),
         Some(MotorEvent::Health(..)) => Told::Health,
         Some(MotorEvent::Acknowledged { command, .. }) => Told::Acknowledged(command),
@@ -245,7 +248,7 @@ fn a_watcher_tells_commands_from_replies() {
         let back = if reply_id == ReplyId::Shared { 0x141 } else { 0x181 };
         // The sequence of a controller that switches on, asks and drives; a lost reply, then a lost command.
         let sequence = [
-            (0x141, ON, Nothing),
+            (0x141, ON, Commanded(0x88)),
             (back, ON, Acknowledged(0x88)),
             (0x141, HEALTH, Nothing),
             (back, health, Health),
@@ -305,7 +308,8 @@ fn what_is_asked_of_both_at_once_is_two_events() {
     let mut wheels = Wheels::new(&sixteen_turns());
     let frame = [0x84, 0x01, 0x7C, 0xFE, 0, 0, 0, 0];
     let events: Vec<_> = wheels.receive(&received(5.0, 0x280, frame)).collect();
-    let asked = |motor| MotorEvent::Asked { motor, time: at_ms(5.0), current_a: 388.0 * 33.0 / 4096.0 };
+    let current_a = Some(388.0 * 33.0 / 4096.0);
+    let asked = |motor| MotorEvent::Commanded { motor, time: at_ms(5.0), command: 0x280, current_a };
     assert_eq!(events, Motor::BOTH.map(asked));
     assert_eq!(wheels.receive(&stamped(5.0, Direction::Sent, 0x280, frame)).count(), 0);
     // The replies are those to 0xA1, even all zeros of a motor that we have asked.
@@ -358,11 +362,158 @@ fn of_a_recording_torques_that_were_sent_are_told_too() {
     let mut replayed = Wheels::new(&sixteen_turns()).telling_sent();
     assert_eq!([asked(&mut live, &sent), asked(&mut live, &together)], [0, 0]);
     let [event] = replayed.receive(&sent).collect::<Vec<_>>()[..] else { panic!("one event") };
-    let MotorEvent::Asked { motor: Motor::Left, current_a, .. } = event else { panic!("{event:?}") };
+    let MotorEvent::Commanded { motor: Motor::Left, current_a: Some(current_a), .. } = event else {
+        panic!("{event:?}")
+    };
     assert!((current_a - 200.0 * 33.0 / 4096.0).abs() < 1e-12, "{current_a} A");
     assert_eq!(asked(&mut replayed, &together), 2);
     // What follows is its reply, and no command of somebody else.
     let reply = reply(0xA1, state(30, 200, 10, 77));
     let told: Vec<_> = replayed.receive(&received(2.2, 0x141, reply)).collect();
     assert!(matches!(told[..], [MotorEvent::State(Motor::Left, _)]), "{told:?}");
+}
+
+/// A robot that is driven at 1 kHz, all that its left motor answers, and one frame of somebody else: it is reported
+/// once, whatever it is and wherever it comes in between.
+#[test]
+fn one_command_of_another_controller_is_reported_whenever_it_comes() {
+    let settings = sixteen_turns();
+    let stop = [0x81, 0, 0, 0, 0, 0, 0, 0];
+    let limited = [0xA6, 1, 0xF4, 0x01, 0x64, 0, 0, 0];
+    let brake = [0x8C, 0, 0, 0, 0, 0, 0, 0];
+    let off = [0x80, 0, 0, 0, 0, 0, 0, 0];
+    let others: [(u16, [u8; 8], u16); 9] = [
+        (0x141, torque(0), 0xA1),
+        (0x141, torque(300), 0xA1),
+        (0x141, Command::Speed { speed_cdps: 0, iq_limit: 0 }.encode(), 0xA2),
+        (0x141, limited, 0xA6),
+        (0x141, stop, 0x81),
+        (0x141, off, 0x80),
+        (0x141, ON, 0x88),
+        (0x141, brake, 0x8C),
+        (0x280, [1, 0, 0, 0, 0, 0, 0, 0], 0x280),
+    ];
+    for ((id, bytes, command), apart) in others.into_iter().flat_map(|other| [(other, false), (other, true)])
+    {
+        // After our command, after its reply, before the next command.
+        for place in [0.1, 0.3, 0.9] {
+            let mut wheels = Wheels::new(&settings);
+            let back = if apart { 0x181 } else { 0x141 };
+            let mut heard = Vec::new();
+            for tick in 0..200_u16 {
+                let start = f64::from(tick);
+                let iq = 3 * (tick % 7) as i16 - 9;
+                let code = if tick < 50 { QUERY } else { torque(iq) };
+                assert_eq!(wheels.receive(&stamped(start, Direction::Sent, 0x141, code)).count(), 0);
+                let warm = reply(code[0], state(31, iq, 40, 0x1200 + tick));
+                let mut frames = vec![(0.25_f64, back, warm)];
+                if tick == 150 {
+                    frames.push((place, id, bytes));
+                    // A motor answers 0.25 ms later.
+                    let answer = if bytes[0] == 0x81 || bytes[0] < 0x90 {
+                        bytes
+                    } else {
+                        reply(bytes[0], state(31, 0, 40, 0x1296))
+                    };
+                    frames.push((place + 0.25, back, answer));
+                }
+                frames.sort_by(|a, b| a.0.total_cmp(&b.0));
+                for (after, id, bytes) in frames {
+                    heard.extend(wheels.receive(&received(start + after, id, bytes)));
+                }
+            }
+            let found: Vec<_> = heard
+                .iter()
+                .filter_map(|event| match event {
+                    MotorEvent::Commanded { motor: Motor::Left, command, .. } => Some(*command),
+                    _ => None,
+                })
+                .collect();
+            assert_eq!(found, [command], "{id:X} {bytes:02X?} at {place}, replies apart: {apart}");
+        }
+    }
+}
+
+/// Queries of a second computer move nothing.
+#[test]
+fn queries_of_somebody_else_are_no_commands() {
+    let mut wheels = Wheels::new(&sixteen_turns());
+    for code in [0x9A, 0x9C, 0x9D, 0x90, 0x92, 0x94, 0xC0, 0xB0, 0x30, 0x33] {
+        let query = [code, 0, 0, 0, 0, 0, 0, 0];
+        assert_eq!(wheels.receive(&received(f64::from(code), 0x141, query)).count(), 0, "{code:X}");
+    }
+}
+
+/// An adapter that returns what it sends, some milliseconds later: every reply is heard as without it, and a foreign
+/// command is still one.
+#[test]
+fn echoes_of_an_adapter_are_neither_commands_nor_replies() {
+    let settings = sixteen_turns();
+    for late_ms in [0.05, 0.6, 3.4] {
+        let mut wheels = Wheels::new(&settings);
+        let mut frames = Vec::new();
+        let mut send = |at: f64, bytes: [u8; 8], answer: [u8; 8]| {
+            frames.push(stamped(at, Direction::Sent, 0x141, bytes));
+            frames.push(received(at + late_ms, 0x141, bytes));
+            frames.push(received(at + late_ms + 0.25, 0x141, answer));
+        };
+        for tick in 0..100_u16 {
+            let at = f64::from(tick);
+            let warm = |code| reply(code, state(31, 5, 40, 0x1200 + tick));
+            match tick {
+                0..50 => send(at, QUERY, warm(0x9C)),
+                50 => send(at, ON, ON),
+                _ => send(at, torque((tick % 3) as i16 - 1), warm(0xA1)),
+            }
+        }
+        frames.push(received(99.95 + late_ms, 0x141, [0x81, 0, 0, 0, 0, 0, 0, 0]));
+        frames.sort_by_key(|frame| frame.time);
+        let events: Vec<_> =
+            frames.iter().flat_map(|frame| wheels.receive(frame).collect::<Vec<_>>()).collect();
+        let count = |wanted: fn(&MotorEvent) -> bool| events.iter().filter(|event| wanted(event)).count();
+        let states = count(|event| matches!(event, MotorEvent::State(..)));
+        let on = count(|event| matches!(event, MotorEvent::Acknowledged { command: 0x88, .. }));
+        let foreign = count(|event| matches!(event, MotorEvent::Commanded { .. }));
+        assert_eq!((states, on, foreign), (99, 1, 1), "{late_ms} ms");
+    }
+}
+
+/// Damaged replies of a serial line: each bit of each reply of a driven robot, one at a time.
+#[test]
+fn a_reply_with_a_wrong_bit_is_no_command() {
+    let warm = state(31, -7, 250, 0x1234);
+    let health = [0x9A, 31, 0x61, 0x09, 0, 0, 0, 0];
+    let off = [0x80, 0, 0, 0, 0, 0, 0, 0];
+    let exchange =
+        [(QUERY, reply(0x9C, warm)), (HEALTH, health), (torque(0), reply(0xA1, warm)), (ON, ON), (off, off)];
+    for (command, answer) in exchange {
+        for bit in 0..64 {
+            let mut wheels = Wheels::new(&sixteen_turns());
+            wheels.receive(&received(0.0, 0x141, reply(0x9C, warm))).for_each(drop);
+            wheels.receive(&stamped(1.0, Direction::Sent, 0x141, command)).for_each(drop);
+            let mut damaged = answer;
+            damaged[bit / 8] ^= 1 << (bit % 8);
+            let events: Vec<_> = wheels.receive(&received(1.25, 0x141, damaged)).collect();
+            let commanded = events.iter().any(|event| matches!(event, MotorEvent::Commanded { .. }));
+            assert!(!commanded, "{damaged:02X?}: {events:?}");
+        }
+    }
+}
+
+#[test]
+fn the_round_trip_of_a_health_query_is_measured() {
+    let health = [0x9A, 31, 0x61, 0x09, 0, 0, 0, 0];
+    let mut wheels = Wheels::new(&sixteen_turns());
+    let mut trip = |sent: Option<f64>, heard: f64| {
+        if let Some(ms) = sent {
+            wheels.receive(&stamped(ms, Direction::Sent, 0x141, HEALTH)).for_each(drop);
+        }
+        match wheels.receive(&received(heard, 0x141, health)).next() {
+            Some(MotorEvent::Health(Motor::Left, health)) => health.round_trip,
+            other => panic!("{other:?}"),
+        }
+    };
+    assert_eq!(trip(Some(10.0), 11.5), Some(at_ms(11.5) - at_ms(10.0)));
+    assert_eq!(trip(Some(50.0), 65.0), Some(at_ms(65.0) - at_ms(50.0)));
+    assert_eq!(trip(None, 70.0), None, "the query of somebody else");
 }

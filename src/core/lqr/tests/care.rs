@@ -229,6 +229,40 @@ fn extreme_numbers_are_solved_or_refused() {
     }
 }
 
+/// Numbers so far apart that no double holds the products of them are named as such, not as a fault of the model.
+#[test]
+fn numbers_too_far_apart_are_named_and_no_mode_is_blamed() {
+    let (a, identity) = ([0.0, 1.0, 0.0, 0.0], [1.0, 0.0, 0.0, 1.0]);
+    for exponent in (-300..=300).step_by(5) {
+        let size = 10.0_f64.powi(exponent);
+        for (b, q, r) in [
+            ([0.0, size], identity, 1.0),
+            ([0.0, 1.0], identity.map(|entry| entry * size), 1.0),
+            ([0.0, 1.0], identity, size),
+            ([0.0, 1.0], [size, 0.0, 0.0, 1.0], 1.0),
+        ] {
+            match solve(&a, &b, &q, &[r]) {
+                Ok(solution) => {
+                    // The slower of two poles so far apart is known to the rounding of the faster one.
+                    let fastest = solution.poles.iter().fold(0.0_f64, |most, pole| most.max(pole.re.abs()));
+                    let stable = |re: f64| re <= 1e-13 * fastest;
+                    assert!(solution.poles.iter().all(|pole| stable(pole.re)), "{b:?} {q:?} {r}");
+                }
+                Err(CareError::TooFarApart { value, .. }) => {
+                    assert!((value / size - 1.0).abs() < 1e-9, "{value:e}")
+                }
+                Err(CareError::OutOfRange) => {}
+                Err(other) => panic!("{b:?} {q:?} {r}: {other}"),
+            }
+        }
+    }
+    let error = solve(&a, &[0.0, 1e155], &identity, &[1.0]).unwrap_err();
+    assert!(
+        error.to_string().starts_with("matrix b has an entry of 1e155, too far from the others"),
+        "{error}"
+    );
+}
+
 /// A mode that the input (`reached` false) or the cost (true) misses but for the rounding of a rotation.
 fn with_lost_mode(generator: &mut ChaCha8Rng, n: usize, eigenvalue: f64, reached: bool) -> [DMatrix<f64>; 3] {
     let mut random = |rows: usize, columns: usize| {

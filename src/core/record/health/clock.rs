@@ -43,11 +43,22 @@ fn order(steps: &[f64], findings: &mut Findings) {
     }
 }
 
+/// Unit that a time which rises by so much a row probably has in place of seconds, and what it is in seconds; logs have 10
+/// to 10,000 rows a second.
+pub(super) fn likely_unit(row_s: f64) -> Option<(&'static str, f64)> {
+    match row_s {
+        ..0.5 => None,
+        0.5..100.0 => Some(("milliseconds", 1e-3)),
+        100.0..1e5 => Some(("microseconds", 1e-6)),
+        _ => Some(("nanoseconds", 1e-9)),
+    }
+}
+
 fn rate(row_s: f64, findings: &mut Findings) {
     let hz = 1.0 / row_s;
-    if row_s >= 0.5 {
-        let problem = format!("time rises by {row_s} s a row, as if it were in milliseconds or microseconds");
-        findings.warn("time_s", problem, "if so, read it with --map time_s=time_s*0.001 or *0.000001");
+    if let Some((unit, factor)) = likely_unit(row_s) {
+        let problem = format!("time rises by {row_s} s a row, as if it were in {unit}");
+        findings.warn("time_s", problem, format!("if so, read it with --map time_s=time_s*{factor}"));
     } else if hz < 45.0 {
         let problem = format!("{:.1} rows a second are too few to see how friction acts", hz);
         findings.warn("time_s", problem, "record 50 rows a second or more");

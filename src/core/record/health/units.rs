@@ -2,7 +2,8 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::{Findings, clock::GAP_ROWS, finite, range};
+use super::clock::{GAP_ROWS, likely_unit};
+use super::{Findings, finite, range};
 use crate::record::Log;
 
 /// Positions and the speeds that must be their derivatives.
@@ -154,11 +155,7 @@ fn agrees(factor: f64) -> bool {
 
 /// The unit, s, that a time probably has which rises by so much a row.
 fn time_unit(row_s: f64) -> f64 {
-    match row_s {
-        ..0.5 => 1.0,
-        0.5..100.0 => 1e-3,
-        _ => 1e-6,
-    }
+    likely_unit(row_s).map_or(1.0, |(_, unit)| unit)
 }
 
 /// By how much the speed is larger than the derivative of the position, where the two go together.

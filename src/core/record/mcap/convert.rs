@@ -30,7 +30,7 @@ pub struct Conversion {
     pub topics: BTreeMap<String, u32>,
     /// Rows and frames that were left out because they are damaged.
     pub dropped: u64,
-    /// The first damage of each file.
+    /// The first damage of each file, and where frames run back in time.
     pub problems: Vec<String>,
 }
 
@@ -83,7 +83,7 @@ pub fn convert<R: BufRead>(
         track.advance()?;
     }
     let dropped = tracks.iter().map(Track::dropped).sum();
-    let problems = tracks.iter().filter_map(Track::first_problem).collect();
+    let problems = tracks.iter().flat_map(Track::problems).collect();
     Ok(Conversion { topics: writer.finish()?, dropped, problems })
 }
 
@@ -101,7 +101,7 @@ struct Track<'a, R> {
 
 enum Reader<'a, R> {
     Log(Box<LogRows<'a, R>>),
-    Frames(FrameLog<'a, R>),
+    Frames(Box<FrameLog<'a, R>>),
 }
 
 enum Head {
@@ -125,7 +125,7 @@ impl<'a, R: BufRead> Track<'a, R> {
         let mut track = Self {
             source,
             reader: if is_frames {
-                Reader::Frames(FrameLog::new(reader, source))
+                Reader::Frames(Box::new(FrameLog::new(reader, source)))
             } else {
                 Reader::Log(Box::new(LogRows::new(reader, source, map)?))
             },
@@ -210,12 +210,12 @@ impl<'a, R: BufRead> Track<'a, R> {
         }
     }
 
-    fn first_problem(&self) -> Option<String> {
-        let problem = match &self.reader {
-            Reader::Log(rows) => rows.problems().0.first(),
-            Reader::Frames(frames) => frames.first_problem(),
+    fn problems(&self) -> impl Iterator<Item = String> {
+        let (damage, time) = match &self.reader {
+            Reader::Log(rows) => (rows.problems().0.first(), None),
+            Reader::Frames(frames) => (frames.first_problem(), frames.time_problem()),
         };
-        problem.map(|problem| format!("{}: {problem}", self.source))
+        damage.into_iter().chain(time).map(|problem| format!("{}: {problem}", self.source))
     }
 }
 

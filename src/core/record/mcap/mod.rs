@@ -24,3 +24,4 @@ mod topics;
 mod writer;
 
 pub use convert::{Conversion, ConvertError, Input, convert};
+pub use writer::is_opening;

@@ -149,6 +149,17 @@ fn files_that_cannot_be_one_are_refused() {
 }
 
 #[test]
+fn frames_that_run_back_in_time_are_a_problem_of_the_file() {
+    let frames = "(10.0) can0 141#A1\n(9.0) can0 141#A1\n(11.0) can0 141#A1\n";
+    let (_, conversion) = converted(vec![input("run.log", "/log", frames)]);
+    assert_eq!((conversion.topics["/can/can0"], conversion.dropped), (3, 0));
+    assert!(
+        conversion.problems[0].starts_with("run.log: line 2: time runs back by 1.000 s"),
+        "{conversion:?}"
+    );
+}
+
+#[test]
 fn damage_is_counted_and_its_first_place_named() {
     let text = FRAMES.to_owned() + "(170";
     let (_, done) = converted(vec![input("run.log", "", &text)]);
@@ -157,6 +168,15 @@ fn damage_is_counted_and_its_first_place_named() {
 }
 
 /// Times that no clock shows: no panic, and the file is whole.
+/// As many names as there are columns, each once, however often one occurs.
+#[test]
+fn fields_have_names_of_their_own() {
+    let names = |columns: &[&str]| super::topics::field_names(columns.iter().copied());
+    assert_eq!(names(&["a b", "a_b", "1", "a_b", "a_b_2"]), ["a_b", "a_b_2", "column_1", "a_b_3", "a_b_2_2"]);
+    let many = names(&vec!["x"; 20_000]);
+    assert_eq!(many.iter().collect::<std::collections::BTreeSet<_>>().len(), 20_000);
+}
+
 #[test]
 fn times_beyond_all_bounds_are_held_there() {
     let text = "time_s,motor_angle_rad,torque_nm\n0,1,2\n1e300,1,2\n# 1e18 s stop: asked\n";

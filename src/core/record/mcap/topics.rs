@@ -1,5 +1,7 @@
 //! Topics and message types of an MCAP file.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use super::protobuf::{File, Kind, MessageType, descriptor_set};
 use crate::link::jy901::{Packet, Reading};
 
@@ -80,16 +82,26 @@ pub(super) fn type_name(topic: &str) -> String {
 
 /// Names of columns as names of fields: letters, digits and underscores, each once.
 pub(super) fn field_names<'a>(columns: impl Iterator<Item = &'a str>) -> Vec<String> {
-    let mut names: Vec<String> = Vec::new();
+    let (mut names, mut taken) = (Vec::new(), BTreeSet::new());
+    let mut repeated: BTreeMap<String, usize> = BTreeMap::new();
     for column in columns {
         let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
         let mut name: String = column.chars().map(plain).collect();
         if !name.starts_with(|c: char| c.is_ascii_alphabetic()) {
             name.insert_str(0, "column_");
         }
-        while names.contains(&name) {
-            name.push('_');
+        if taken.contains(&name) {
+            // Counted, so that many columns of one name do not take the longer the more there are.
+            let count = repeated.entry(name.clone()).or_insert(1);
+            name = loop {
+                *count += 1;
+                let numbered = format!("{name}_{count}");
+                if !taken.contains(&numbered) {
+                    break numbered;
+                }
+            };
         }
+        taken.insert(name.clone());
         names.push(name);
     }
     names

@@ -20,6 +20,17 @@ pub(super) struct McapWriter<W: Write> {
     message: Message,
 }
 
+/// Beginning of the name that a file gives the library that wrote it.
+const LIBRARY: &str = "flqr ";
+/// Bytes up to that name: magic, opcode, length of the record, empty profile, length of the name.
+const BEFORE_LIBRARY: usize = 8 + 1 + 8 + 4 + 4;
+
+/// Whether a file that begins with these bytes was written by flqr.
+pub fn is_opening(bytes: &[u8]) -> bool {
+    let library = bytes.get(BEFORE_LIBRARY..BEFORE_LIBRARY + LIBRARY.len());
+    bytes.starts_with(::mcap::MAGIC) && library == Some(LIBRARY.as_bytes())
+}
+
 #[derive(Clone, Copy)]
 struct Channel {
     id: u16,
@@ -31,7 +42,7 @@ impl<W: Write> McapWriter<W> {
         let options = WriteOptions::new()
             .compression(None)
             .disable_seeking(true)
-            .library(concat!("flqr ", env!("CARGO_PKG_VERSION")));
+            .library(format!("{LIBRARY}{}", env!("CARGO_PKG_VERSION")));
         let out = options.create(NoSeek::new(out)).map_err(io_error)?;
         Ok(Self { out, channels: BTreeMap::new(), message: Message::default() })
     }

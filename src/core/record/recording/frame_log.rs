@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 use std::fmt::Display;
 use std::io::{BufRead, Read};
+use std::time::Duration;
 
 use crate::link::candump::{self, Entry, LoggedFrame};
 use crate::link::{Direction, StampedFrame};
@@ -10,6 +11,8 @@ use crate::record::{LineProblem, LogError};
 
 /// A line longer than this is damage, not a frame.
 const LINE_LIMIT_BYTES: usize = 1 << 10;
+/// Frames may be so far out of order: a sent one is stamped before a received one that was waiting.
+const OUT_OF_ORDER: Duration = Duration::from_millis(1);
 
 /// Reads a candump file frame by frame. A line that is no classic frame is left out and counted, and so is a last
 /// line without an end: it was cut.
@@ -23,6 +26,10 @@ pub struct FrameLog<'a, R> {
     frames: u64,
     damaged: u64,
     first_problem: Option<LineProblem>,
+    /// Latest time so far.
+    latest: Duration,
+    /// The first frame that runs back in time.
+    first_back: Option<LineProblem>,
 }
 
 impl<'a, R: BufRead> FrameLog<'a, R> {
@@ -38,6 +45,8 @@ impl<'a, R: BufRead> FrameLog<'a, R> {
             frames: 0,
             damaged: 0,
             first_problem: None,
+            latest: Duration::ZERO,
+            first_back: None,
         }
     }
 
@@ -56,6 +65,11 @@ impl<'a, R: BufRead> FrameLog<'a, R> {
         self.first_problem.as_ref()
     }
 
+    /// The first frame that runs back in time; it is not left out.
+    pub fn time_problem(&self) -> Option<&LineProblem> {
+        self.first_back.as_ref()
+    }
+
     /// The next frame and its interface; times count from 1970.
     ///
     /// # Errors
@@ -65,6 +79,16 @@ impl<'a, R: BufRead> FrameLog<'a, R> {
             match parse(&self.line) {
                 Ok((interface, frame)) => {
                     self.frames += 1;
+                    let back = self.latest.saturating_sub(frame.time);
+                    self.latest = self.latest.max(frame.time);
+                    if back > OUT_OF_ORDER {
+                        let problem = format!(
+                            "time runs back by {:.3} s: sort the lines by time, or split the file where the clock was set back",
+                            back.as_secs_f64()
+                        );
+                        let (line, column) = (self.number, String::new());
+                        self.first_back.get_or_insert(LineProblem { line, column, problem });
+                    }
                     self.interface.clear();
                     self.interface.push_str(interface);
                     return Ok(Some((&self.interface, frame)));
@@ -141,8 +165,6 @@ fn parse(line: &[u8]) -> Result<(&str, StampedFrame), String> {
 
 #[cfg(test)]
 mod tests {
-    use std::time::Duration;
-
     use super::*;
     use crate::link::{Frame, FrameId};
 
@@ -203,6 +225,30 @@ mod tests {
                 (&all[..lines], u64::from(!text[..end].ends_with('\n')))
             );
         }
+    }
+
+    #[test]
+    fn frames_that_run_back_in_time_are_kept_and_named() {
+        let lines = |times: &[&str]| -> String {
+            times.iter().map(|time| format!("(1700000000.{time}) can0 141#A1\n")).collect()
+        };
+        let read = |text: &str| {
+            let mut log = FrameLog::new(text.as_bytes(), "run.log");
+            let mut count = 0;
+            while log.next_frame().unwrap().is_some() {
+                count += 1;
+            }
+            (count, log.damaged(), log.time_problem().map(ToString::to_string))
+        };
+        assert_eq!(
+            read(&lines(&["001000", "002000", "001500", "003000"])),
+            (4, 0, None),
+            "stamped out of order"
+        );
+        let (count, damaged, problem) = read(&lines(&["500000", "900000", "250000", "300000", "950000"]));
+        let problem = problem.unwrap();
+        assert_eq!((count, damaged), (5, 0));
+        assert!(problem.starts_with("line 3: time runs back by 0.650 s: sort"), "{problem}");
     }
 
     #[test]

@@ -33,5 +33,5 @@ pub const FIRST_LINE: &str = "# flqr recording";
 pub const IMU_INTERFACE: &str = "imu";
 
 /// Columns of a recording's robot log behind [`super::Sample::COLUMNS`].
-pub const OPTIONAL_COLUMNS: [&str; 3] =
-    ["motor_temperature_left_c", "motor_temperature_right_c", "bus_voltage_v"];
+pub const OPTIONAL_COLUMNS: [&str; 4] =
+    ["motor_temperature_left_c", "motor_temperature_right_c", "bus_voltage_v", "round_trip_s"];

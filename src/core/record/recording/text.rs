@@ -28,6 +28,8 @@ pub struct Row {
     pub motor_temperature_c: [Option<f64>; 2],
     /// Newest voltage of the supply, V.
     pub bus_voltage_v: Option<f64>,
+    /// Newest time from a query of a motor to its reply, of the slower motor, s.
+    pub round_trip_s: Option<f64>,
 }
 
 impl Row {
@@ -39,7 +41,7 @@ impl Row {
 
 impl From<Sample> for Row {
     fn from(sample: Sample) -> Self {
-        Self { sample, motor_temperature_c: [None; 2], bus_voltage_v: None }
+        Self { sample, motor_temperature_c: [None; 2], bus_voltage_v: None, round_trip_s: None }
     }
 }
 
@@ -74,7 +76,8 @@ pub fn parse_start(comment: &str) -> Option<Duration> {
 /// Adds a row to the robot log.
 pub fn push_row(text: &mut String, row: &Row) {
     let [left, right] = row.motor_temperature_c;
-    push_cells(text, row.sample.to_row().map(Some).into_iter().chain([left, right, row.bus_voltage_v]));
+    let optional = [left, right, row.bus_voltage_v, row.round_trip_s];
+    push_cells(text, row.sample.to_row().map(Some).into_iter().chain(optional));
 }
 
 /// Adds a row to the bench log of a motor.

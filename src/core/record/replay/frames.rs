@@ -66,8 +66,9 @@ impl<R: BufRead> FrameTrack<R> {
         self.log.damaged()
     }
 
-    pub(super) fn problem(&self) -> Option<String> {
-        self.log.first_problem().map(|problem| format!("{}: {problem}", self.name))
+    pub(super) fn problems(&self) -> impl Iterator<Item = String> {
+        let problems = self.log.first_problem().into_iter().chain(self.log.time_problem());
+        problems.map(|problem| format!("{}: {problem}", self.name))
     }
 
     /// Makes a frame the next item, at its time of the session.

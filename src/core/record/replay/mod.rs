@@ -158,9 +158,9 @@ impl<R: BufRead> Replay<R> {
         ReplayCounts { damaged: rows + frames, ..self.counts }
     }
 
-    /// The first damage of each file so far.
+    /// The first damage of each file so far, and where frames run back in time.
     pub fn problems(&self) -> impl Iterator<Item = String> {
         let rows = self.rows.as_ref().and_then(RowTrack::problem);
-        rows.into_iter().chain(self.frames.as_ref().and_then(FrameTrack::problem))
+        rows.into_iter().chain(self.frames.iter().flat_map(FrameTrack::problems))
     }
 }

@@ -125,11 +125,8 @@ pub(super) fn carried(
 /// Findings about other zeros of the angle, and about effects without which the logs are told better.
 pub(super) fn findings(declared: &Declared, logs: &[&Log], carried: &[Carried]) -> Vec<HealthFinding> {
     let column = declared.names().position;
-    let finding = |column: &str, problem, mend: &str| HealthFinding {
-        severity: Severity::Warning,
-        column: column.to_owned(),
-        problem,
-        mend: mend.to_owned(),
+    let finding = |column: &str, problem: String, mend: &str| {
+        HealthFinding::new(Severity::Warning, column, problem, mend)
     };
     let turned = declared.zeros_rad.iter().zip(logs).filter(|(zero_rad, _)| **zero_rad != 0.0);
     let mut found: Vec<HealthFinding> = turned

@@ -50,7 +50,7 @@ const AT_REST: f64 = 0.1;
 const HELD_ROWS: usize = 3;
 
 fn finding(severity: Severity, column: &str, problem: String, mend: impl Into<String>) -> HealthFinding {
-    HealthFinding { severity, column: column.to_owned(), problem, mend: mend.into() }
+    HealthFinding::new(severity, column, problem, mend.into())
 }
 
 /// Findings about logs, those that are held out among them.

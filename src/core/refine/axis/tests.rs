@@ -7,7 +7,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::model_file::Model;
-use crate::record::{HealthFinding, Log, Severity};
+use crate::record::{HealthFinding, Log, LogKind, Severity};
 use crate::refine::verdict::Channels;
 use crate::refine::{Options, Refinement, Verdict, refine, residual};
 use crate::robot::Motor;
@@ -252,6 +252,28 @@ fn even_motion_tells_of_cogging_and_not_of_the_inertia() {
 }
 
 /// Held-out logs steer the answer too.
+/// A log of another kind is refused, on either side, also where the model describes both.
+#[test]
+fn held_out_logs_are_of_the_kind_of_the_others() {
+    let model = crate::model_file::presets::paper();
+    let log = |columns: &[&str]| {
+        let values: Vec<f64> = (0..200).map(|row| f64::from(row) * 0.01).collect();
+        Log::from_columns("a.csv", columns.iter().map(|name| (*name, values.clone())))
+    };
+    let (bench, robot) = (log(LogKind::Bench.required()), log(LogKind::Robot.required()));
+    for (one, other) in [(&bench, &robot), (&robot, &bench)] {
+        let found = refine(
+            &model,
+            std::slice::from_ref(one),
+            &[one.clone(), other.clone()],
+            &Options::default(),
+            &mut |_| ControlFlow::Continue(()),
+        );
+        let error = found.err().unwrap();
+        assert!(error.to_string().contains("refine with them apart"), "{error}");
+    }
+}
+
 #[test]
 fn held_out_logs_are_checked_and_have_the_rate_of_the_others() {
     let (log, other) = (shaft(1, |_, _, _| 0.0), shaft(2, |_, _, _| 0.0));

@@ -234,7 +234,8 @@ impl Rows {
         let rest_speed = (REST_SHARE * rms).max(3.0 * noise);
         for (stretch, speed) in stretches.into_iter().zip(motions) {
             let acceleration = derivative(&speed, stretch.step_s);
-            let blur = self.kernel.blur();
+            // A clock that is off by orders of magnitude makes a kernel longer than the log.
+            let blur = self.kernel.blur().min(stretch.position.len());
             // The kernel reaches twice as far as it resolves.
             let resting = near_rest(&speed, rest_speed, blur, 2 * blur);
             counts[0] += resting.iter().filter(|&&rest| rest).count();
@@ -489,7 +490,7 @@ fn with_speed(log: &Log, names: Names) -> Vec<Stretch> {
 fn agreement(kernel: &Kernel, stretches: &[Stretch], asked: Asked) -> Option<Agreement> {
     let ends = (2.0 * END_PERIODS / (kernel.cutoff_hz * kernel.step_s)) as usize;
     let mut columns: [Vec<f64>; 4] = Default::default();
-    for stretch in stretches.iter().filter(|stretch| stretch.position.len() > 4 * ends) {
+    for stretch in stretches.iter().filter(|stretch| stretch.position.len() / 4 > ends) {
         let of_position = kernel.apply(&second_difference(&stretch.position, stretch.step_s));
         let speed = if asked.is_all() { Vec::new() } else { kernel.apply(&stretch.effort) };
         let of_speed = kernel.apply(&derivative(&stretch.effort, stretch.step_s));

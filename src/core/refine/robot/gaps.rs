@@ -30,17 +30,13 @@ pub(super) fn findings(logs: &[Log]) -> Vec<HealthFinding> {
             0 => String::new(),
             rows => format!(", {rows} rows of shorter ones are left out"),
         };
-        Some(HealthFinding {
-            severity: Severity::Warning,
-            column: "time_s".to_owned(),
-            problem: format!(
-                "no rows for {:.2} s from {:.2} s on{more}: runs of their own are {}{left}",
-                time[first] - time[first - 1],
-                time[first - 1],
-                stretches.len(),
-            ),
-            mend: "record without a break".to_owned(),
-        })
+        let problem = format!(
+            "no rows for {:.2} s from {:.2} s on{more}: runs of their own are {}{left}",
+            time[first] - time[first - 1],
+            time[first - 1],
+            stretches.len(),
+        );
+        Some(HealthFinding::new(Severity::Warning, "time_s", problem, "record without a break"))
     };
     logs.iter().filter_map(of_log).collect()
 }

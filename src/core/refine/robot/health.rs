@@ -61,7 +61,7 @@ pub(super) fn inseparable() -> HealthFinding {
 }
 
 fn finding(severity: Severity, column: &str, problem: String, mend: &str) -> HealthFinding {
-    HealthFinding { severity, column: column.to_owned(), problem, mend: mend.to_owned() }
+    HealthFinding::new(severity, column, problem, mend)
 }
 
 fn of_log(log: &Log, readings: &Readings, robot: &RobotModel) -> Vec<HealthFinding> {

@@ -2,10 +2,14 @@
 
 #![allow(dead_code, reason = "each test program uses a part of it")]
 
+pub(crate) mod script;
+
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use egui::{Event, Key, Modifiers, PointerButton, Pos2, Vec2, vec2};
+use egui::{
+    Event, Key, Modifiers, PointerButton, Pos2, Vec2, ViewportCommand, ViewportEvent, ViewportId, vec2,
+};
 use egui_kittest::{Harness, kittest::Queryable};
 use flqr_core::model_file::Model;
 use flqr_gui::{App, Tab, WindowOptions};
@@ -177,4 +181,14 @@ pub(crate) fn random_input(window: &mut Window, mut seed: u64) {
         }
         window.step();
     }
+}
+
+/// Asks the window to close, and says whether it would.
+pub(crate) fn closes(window: &mut Window) -> bool {
+    let viewport = window.input_mut().viewports.entry(ViewportId::ROOT).or_default();
+    viewport.events.push(ViewportEvent::Close);
+    window.step();
+    let cancelled = window.output().viewport_output[&ViewportId::ROOT].commands.clone();
+    window.run_steps(2);
+    !cancelled.contains(&ViewportCommand::CancelClose)
 }

@@ -115,7 +115,8 @@ fn an_imu_slower_than_set_is_named() {
 #[test]
 fn another_controller_on_the_bus_is_named() {
     let mut rig = checked(|_| {});
-    let asked = MotorEvent::Asked { motor: Motor::Left, time: rig.now(), current_a: 0.2 };
+    let (time, current_a) = (rig.now(), None);
+    let asked = MotorEvent::Commanded { motor: Motor::Left, time, command: 0x81, current_a };
     let inputs = Inputs { motors: &[asked], orders: &[DriveOrder::Arm], ..Inputs::default() };
     let output = rig.drive.step(rig.now(), &inputs);
     assert!(format!("{:?}", output.events).contains("another controller on the bus"), "{:?}", output.events);

@@ -1,6 +1,6 @@
 //! The balancing robot under a drive.
 
-use super::rig::{Rig, controller, paper};
+use super::rig::{Rig, controller, in_hand, leans_forward, paper};
 use crate::control::drive::{Drive, DriveSettings, Excitation, StopReason};
 use crate::control::{ControllerKind, Measurement, Odometry, Reference};
 use crate::model_file::RobotModel;
@@ -35,14 +35,15 @@ fn without_compensation_it_is_the_simulated_loop_to_the_last_bit() {
         let mut twin = SimulatedRobot::on_ground(&robot, &settings, &[const { Ground::flat() }; 2]).unwrap();
         for tick in 0..armed {
             twin.read();
-            let pitch_rad = (rig.hand)(1e-3 * (tick + 1) as f64);
-            twin.hold([0.0; 2], &State { pitch_rad, ..State::default() });
+            twin.hold([0.0; 2], &in_hand(rig.hand, tick + 1));
         }
         let odometry = Odometry::new(&robot);
         let mut compared = 0;
         for sample in found {
             let measured = odometry.measurement(&twin.read());
-            let asked = control.step(&measured, &Reference::default());
+            // The torque limit rises from 0 within 0.2 s.
+            let limit = 2.42 * (f64::from(compared + 1) / 200.0).min(1.0);
+            let asked = control.step(&measured, &Reference::default()).map(|nm| nm.clamp(-limit, limit));
             assert_eq!(
                 [sample.torque_left_nm, sample.torque_right_nm],
                 asked,
@@ -131,7 +132,7 @@ fn a_wrong_torque_scale_is_told_from_a_payload() {
             let drive = Drive::new(&robot, control, Excitation::Balance, DriveSettings::default()).unwrap();
             let mut rig = Rig::new(&actual, drive, false, true, 1);
             rig.torque_scale = scale;
-            rig.hand = |time| if time < 4.0 { super::rig::rock(time) } else { 0.03 };
+            rig.hand = leans_forward;
             rig.arm();
             let stop = rig.run(3.0).map(|(_, reason)| reason);
             match stop {

@@ -20,11 +20,12 @@ fn states(ms: u64, angle_rad: f64, current_a: f64) -> [MotorEvent; 2] {
 }
 
 fn imu(ms: u64, pitch_rad: f64) -> ImuReading {
-    ImuReading { time: at(ms), pitch_rad, pitch_rate_rad_s: 0.5, tilt_rad: None, temperature_c: None }
+    let (tilt_rad, yaw_rate_rad_s, temperature_c) = (None, None, None);
+    ImuReading { time: at(ms), pitch_rad, pitch_rate_rad_s: 0.5, tilt_rad, yaw_rate_rad_s, temperature_c }
 }
 
 fn asked(ms: u64, motor: Motor, current_a: f64) -> MotorEvent {
-    MotorEvent::Asked { motor, time: at(ms), current_a }
+    MotorEvent::Commanded { motor, time: at(ms), command: 0xA1, current_a: Some(current_a) }
 }
 
 #[test]

@@ -1,6 +1,10 @@
 mod air;
 mod checking;
 mod driving;
+mod gains;
 mod listening;
+mod quiet;
 mod rig;
+mod self_test;
 mod stopping;
+mod watching;

@@ -1,5 +1,6 @@
 //! A simulated robot in lock-step with a drive: what is asked at a tick is answered at the next, without any bytes.
 
+use std::collections::VecDeque;
 use std::time::Duration;
 
 use crate::control::drive::{
@@ -44,6 +45,22 @@ pub(super) enum Fault {
     TurnsLost(Motor),
     /// Somebody else commands a motor, too.
     Commanded(Motor),
+    /// An encoder gives the same angle, and speed 0.
+    EncoderFrozen(Motor),
+    BothEncodersFrozen,
+    /// An encoder gives the same angle; the speed is right.
+    AngleFrozen(Motor),
+    /// The IMU's pitch does not change any more, its rate is 0, its pitch is off by an angle.
+    PitchFrozen,
+    RateZero,
+    PitchOff(f64),
+    /// It drifts, rad/s.
+    PitchDrift(f64),
+    /// A motor gives the opposite of its torque; each gives the torque of the other.
+    TorqueReversed(Motor),
+    TorquesSwapped,
+    /// Somebody holds the robot still.
+    Held,
 }
 
 pub(super) struct Rig {
@@ -67,12 +84,47 @@ pub(super) struct Rig {
     torque_nm: [f64; 2],
     answers: Vec<MotorEvent>,
     frozen: Option<ImuReading>,
+    /// Angles of the encoders while they worked, and the state in which the robot was held.
+    kept_angle_rad: [f64; 2],
+    held: State,
+    /// Of the axle, at the last tick.
+    acceleration_m_s2: f64,
+    speed_m_s: f64,
+    /// Ticks by which the motors hear later what is sent to them.
+    pub(super) latency: u64,
+    on_the_way: VecDeque<(u64, MotorOrder)>,
     pub(super) outputs: Vec<(Duration, Output)>,
 }
 
 /// Rocks by 0.1 rad once in 2 s, for 4 s, and stands then.
 pub(super) fn rock(time_s: f64) -> f64 {
     if time_s < 4.0 { 0.1 * (std::f64::consts::PI * time_s).sin() } else { 0.0 }
+}
+
+/// State of a robot at a tick in a hand that moves its body so.
+pub(super) fn in_hand(hand: fn(f64) -> f64, tick: u64) -> State {
+    let time_s = 1e-3 * tick as f64;
+    let pitch_rate_rad_s = (hand(time_s + 1e-4) - hand(time_s - 1e-4)) / 2e-4;
+    State { pitch_rad: hand(time_s), pitch_rate_rad_s, ..State::default() }
+}
+
+/// Rocks, then leans by an angle from 4 s on.
+fn leans(time_s: f64, lean_rad: f64) -> f64 {
+    let share = ((time_s - 3.0) / 1.0).clamp(0.0, 1.0);
+    rock(time_s) + lean_rad * share * share * (3.0 - 2.0 * share)
+}
+
+/// The same by a little forward, by as much as is allowed, and backward.
+pub(super) fn leans_forward(time_s: f64) -> f64 {
+    leans(time_s, 0.03)
+}
+
+pub(super) fn leans_far(time_s: f64) -> f64 {
+    leans(time_s, 0.13)
+}
+
+pub(super) fn leans_back(time_s: f64) -> f64 {
+    leans(time_s, -0.05)
 }
 
 impl Rig {
@@ -85,6 +137,7 @@ impl Rig {
         let robot = if in_air {
             SimulatedRobot::in_air(&actual, &settings)
         } else {
+            // The ground of the model's surroundings.
             SimulatedRobot::on_ground(&actual, &settings, &[const { Ground::flat() }; 2])
         };
         Self {
@@ -96,13 +149,19 @@ impl Rig {
             signs: [1.0; 3],
             tilt_off_rad: 0.0,
             faults: Vec::new(),
-            hand: rock,
+            hand: if in_air { |_| 0.0 } else { rock },
             on: [false; 2],
             in_air,
             imu_period: u64::from(actual.sensors.imu_period_ticks()),
             torque_nm: [0.0; 2],
             answers: Vec::new(),
             frozen: None,
+            kept_angle_rad: [0.0; 2],
+            held: State::default(),
+            acceleration_m_s2: 0.0,
+            speed_m_s: 0.0,
+            latency: 0,
+            on_the_way: VecDeque::new(),
             outputs: Vec::new(),
         }
     }
@@ -133,13 +192,16 @@ impl Rig {
             Some(Fault::Temperature(_, c)) => c,
             _ => 35.0,
         };
+        let frozen =
+            self.faulty(|f| [Fault::EncoderFrozen(motor), Fault::BothEncodersFrozen].contains(f)).is_some();
+        let speed_rad_s = if frozen { 0.0 } else { sign * readings.motor_speed_rad_s[side] };
         let broken = motor == Motor::Right && self.faulty(|f| *f == Fault::NotFinite).is_some();
         MotorEvent::State(
             motor,
             MotorState {
                 time: self.now(),
-                angle_rad: sign * readings.motor_angle_rad[side],
-                speed_rad_s: if broken { f64::NAN } else { sign * readings.motor_speed_rad_s[side] },
+                angle_rad: sign * self.kept_angle_rad[side],
+                speed_rad_s: if broken { f64::NAN } else { speed_rad_s },
                 current_a: self.torque_nm[side] / 0.32,
                 temperature_c,
             },
@@ -165,6 +227,7 @@ impl Rig {
                 supply_current_a: Some(0.1),
                 on: Some(self.on[motor as usize] && !off),
                 errors,
+                round_trip: Some(Duration::from_millis(1 + self.latency)),
             },
         )
     }
@@ -174,12 +237,29 @@ impl Rig {
             return None;
         }
         let pitch_rad = self.signs[0] * readings.pitch_rad;
+        let off_rad = match self.faulty(|f| matches!(f, Fault::PitchOff(_))) {
+            Some(Fault::PitchOff(off_rad)) => off_rad,
+            _ => 0.0,
+        };
+        let drifts = self.faults.iter().find_map(|(from, fault)| match fault {
+            Fault::PitchDrift(rate) => Some(rate * 1e-3 * self.tick.saturating_sub(*from) as f64),
+            _ => None,
+        });
+        let off_rad = off_rad + drifts.unwrap_or(0.0);
+        let stuck = self.frozen.filter(|_| self.faulty(|f| *f == Fault::PitchFrozen).is_some());
+        let rate =
+            if self.faulty(|f| *f == Fault::RateZero).is_some() { 0.0 } else { readings.pitch_rate_rad_s };
         let reading = ImuReading {
             time: self.now(),
-            pitch_rad,
-            pitch_rate_rad_s: self.signs[0] * readings.pitch_rate_rad_s,
+            pitch_rad: stuck.map_or(pitch_rad, |kept| kept.pitch_rad) + off_rad,
+            pitch_rate_rad_s: self.signs[0] * rate,
             // The noise of an acceleration, which never stands still.
-            tilt_rad: Some(pitch_rad + self.tilt_off_rad + 1e-3 * ((self.tick as f64) * 12.9898).sin()),
+            tilt_rad: Some(
+                pitch_rad - self.acceleration_m_s2 / 9.81
+                    + self.tilt_off_rad
+                    + 1e-3 * ((self.tick as f64) * 12.9898).sin(),
+            ),
+            yaw_rate_rad_s: Some(self.robot.pose().yaw_rate_rad_s),
             temperature_c: None,
         };
         if self.faulty(|f| *f == Fault::ImuFrozen).is_some() {
@@ -193,6 +273,16 @@ impl Rig {
     /// One tick with orders from whoever drives.
     pub(super) fn step(&mut self, orders: &[DriveOrder]) -> &Output {
         let readings = self.robot.read();
+        for motor in Motor::BOTH {
+            let frozen = |f: &Fault| {
+                let kinds =
+                    [Fault::EncoderFrozen(motor), Fault::BothEncodersFrozen, Fault::AngleFrozen(motor)];
+                kinds.contains(f)
+            };
+            if self.faulty(frozen).is_none() {
+                self.kept_angle_rad[motor as usize] = readings.motor_angle_rad[motor as usize];
+            }
+        }
         let imu: Vec<ImuReading> = self.imu(&readings).into_iter().collect();
         let mut motors = std::mem::take(&mut self.answers);
         if !self.wire {
@@ -213,7 +303,7 @@ impl Rig {
                 motors.push(MotorEvent::TurnsLost { motor, time, silent: Duration::from_millis(61) });
             }
             if self.faulty(|f| *f == Fault::Commanded(motor)).is_some() {
-                motors.push(MotorEvent::Asked { motor, time, current_a: 0.1 });
+                motors.push(MotorEvent::Commanded { motor, time, command: 0x81, current_a: None });
             }
         }
         let late = match self.faulty(|f| matches!(f, Fault::Late(_))) {
@@ -223,7 +313,8 @@ impl Rig {
         let bus_down = self.faulty(|f| *f == Fault::BusDown).is_some();
         let inputs = Inputs { motors: &motors, imu: &imu, orders, bus_down, late };
         let output = self.drive.step(self.now(), &inputs);
-        for &order in output.orders.iter() {
+        self.on_the_way.extend(output.orders.iter().map(|order| (self.tick + self.latency, *order)));
+        while let Some((_, order)) = self.on_the_way.pop_front_if(|(due, _)| *due <= self.tick) {
             self.hear(order, &readings);
         }
         self.outputs.push((self.now(), output));
@@ -265,13 +356,29 @@ impl Rig {
     }
 
     fn advance(&mut self) {
-        let torque = self.torque_nm.map(|nm| self.torque_scale * nm);
-        if self.in_air || !self.on.contains(&true) {
-            let pitch_rad = if self.in_air { 0.0 } else { (self.hand)(1e-3 * (self.tick + 1) as f64) };
-            self.robot.hold(torque, &State { pitch_rad, ..State::default() });
+        let mut torque = self.torque_nm.map(|nm| self.torque_scale * nm);
+        if self.faulty(|f| *f == Fault::TorquesSwapped).is_some() {
+            torque.swap(0, 1);
+        }
+        for motor in Motor::BOTH {
+            if self.faulty(|f| *f == Fault::TorqueReversed(motor)).is_some() {
+                torque[motor as usize] *= -1.0;
+            }
+        }
+        let held = self.faulty(|f| *f == Fault::Held).is_some();
+        if !held {
+            self.held = State { x_dot_m_s: 0.0, pitch_rate_rad_s: 0.0, ..self.robot.state() };
+        }
+        if held && self.on.contains(&true) {
+            self.robot.hold(torque, &self.held);
+        } else if self.in_air || !self.on.contains(&true) {
+            self.robot.hold(torque, &in_hand(self.hand, self.tick + 1));
         } else {
             self.robot.advance(torque);
         }
+        let speed_m_s = self.robot.state().x_dot_m_s;
+        self.acceleration_m_s2 = (speed_m_s - self.speed_m_s) / TICK_S;
+        self.speed_m_s = speed_m_s;
     }
 
     /// Checks, rocks and arms; the tick at which it was armed.

@@ -27,24 +27,24 @@ fn orders_from(rig: &Rig, time: Duration) -> Vec<(Duration, Vec<MotorOrder>)> {
 fn each_watch_fires_within_its_time_and_a_tick() {
     let limits = SafetyLimits::default();
     let (imu, frozen, motor) = (limits.imu_timeout_s, limits.imu_frozen_s, limits.motor_timeout_s);
-    // The last reading before the fault is up to a period older than the fault; health is asked for at 5 Hz, and its
-    // answer is a tick under way.
+    // The last reading before the fault is up to a period older than the fault; health is asked for every 30
+    // and 60 ms in turn, and its answer is a tick under way.
     for (fault, name, least_s, most_s) in [
         (Fault::MotorVanishes(Motor::Left), "motor_silent", motor - 0.002, motor + 0.001),
         (Fault::MotorVanishes(Motor::Right), "motor_silent", motor - 0.002, motor + 0.001),
         (Fault::ImuSilent, "imu_silent", imu - 0.010, imu + 0.001),
         (Fault::ImuFrozen, "imu_frozen", frozen - 0.010, frozen + 0.001),
-        (Fault::Errors(Motor::Right, MotorErrors(0b1000)), "motor_error", 0.0, 0.202),
-        (Fault::Off(Motor::Left), "motor_off", 0.0, 0.202),
+        (Fault::Errors(Motor::Right, MotorErrors(0b1000)), "motor_error", 0.0, 0.062),
+        (Fault::Off(Motor::Left), "motor_off", 0.0, 0.062),
         (Fault::Temperature(Motor::Left, 80.5), "motor_hot", 0.0, 0.002),
-        (Fault::Voltage(19.9), "voltage", 0.0, 0.202),
-        (Fault::Voltage(30.1), "voltage", 0.0, 0.202),
+        (Fault::Voltage(19.9), "voltage", 0.0, 0.062),
+        (Fault::Voltage(30.1), "voltage", 0.0, 0.062),
         (Fault::NotFinite, "not_finite", 0.0, 0.002),
         (Fault::BusDown, "bus_down", 0.0, 0.0),
         (Fault::Late(0.0201), "late", 0.0, 0.0),
-        (Fault::HealthSilent(Motor::Left), "health_silent", 0.7 - 0.202, 0.702),
+        (Fault::HealthSilent(Motor::Left), "health_silent", 0.3 - 0.062, 0.302),
         (Fault::TurnsLost(Motor::Right), "turns_lost", 0.0, 0.001),
-        (Fault::Commanded(Motor::Left), "other_controller", 0.001, 0.002),
+        (Fault::Commanded(Motor::Left), "other_controller", 0.0, 0.0),
     ] {
         for offset in [0, 3, 7, 9] {
             let (mut rig, armed) = armed(1);
@@ -140,16 +140,29 @@ fn a_stop_is_repeated_until_it_is_acknowledged_and_nothing_follows() {
 }
 
 #[test]
-fn stop_comes_first_whatever_else_is_asked_for_and_from_every_stage() {
-    let off = [MotorOrder::Torque([0.0; 2]), MotorOrder::Off];
+fn stop_comes_first_whatever_else_is_asked_for() {
     let (mut rig, _) = armed(5);
     let asked = &rig.step(&[DriveOrder::Stop, DriveOrder::Arm, DriveOrder::Check]).orders;
-    assert_eq!(asked[..], off);
-    let mut rig = Rig::balancing(&paper(), ControllerKind::Lqr, DriveSettings::default(), 1);
-    rig.step(&[DriveOrder::Check]);
-    assert_eq!(rig.step(&[DriveOrder::Stop]).orders[..], off);
-    let mut rig = Rig::balancing(&paper(), ControllerKind::Lqr, DriveSettings::default(), 1);
-    assert_eq!(rig.step(&[DriveOrder::Stop]).orders[..], off);
+    assert_eq!(asked[..], [MotorOrder::Torque([0.0; 2]), MotorOrder::Off]);
+}
+
+/// A robot that balances under its own controller would fall.
+#[test]
+fn motors_that_were_not_switched_on_here_are_not_switched_off() {
+    for checked in [false, true] {
+        let mut rig = Rig::balancing(&paper(), ControllerKind::Lqr, DriveSettings::default(), 1);
+        if checked {
+            rig.step(&[DriveOrder::Check]);
+        }
+        assert_eq!(rig.step(&[DriveOrder::Stop]).orders[..], []);
+        assert_eq!(rig.drive.stage(), Stage::Stopped(StopReason::Asked));
+        assert!(rig.drive.has_ended());
+        (0..100).for_each(|_| drop(rig.step(&[]).clone()));
+        let sent = rig.outputs.iter().flat_map(|(_, output)| output.orders.iter());
+        assert!(sent.clone().all(|order| matches!(order, MotorOrder::ReadState | MotorOrder::ReadHealth)));
+        rig.step(&[DriveOrder::Release]);
+        assert_eq!(rig.drive.stage(), Stage::Listening);
+    }
 }
 
 #[test]
@@ -242,11 +255,72 @@ fn listening_gives_no_order() {
         let now = Duration::from_millis(tick);
         let motors = [
             crate::link::MotorEvent::State(Motor::Left, crate::link::MotorState { time: now, ..state }),
-            crate::link::MotorEvent::Asked { motor: Motor::Right, time: now, current_a: 1.0 },
+            crate::link::MotorEvent::Commanded {
+                motor: Motor::Right,
+                time: now,
+                command: 0xA1,
+                current_a: Some(1.0),
+            },
         ];
         let bus_down = tick % 7 == 0;
         let inputs = Inputs { motors: &motors, bus_down, ..Inputs::default() };
         let output = listening.drive.step(now, &inputs);
         assert!(output.orders.is_empty() && output.events.is_empty());
     }
+}
+
+/// Motors that roll out get torques of zero, and are switched off once they are slow, silent, or a second has passed.
+#[test]
+fn motors_roll_out_before_they_are_switched_off_where_that_is_chosen() {
+    let mut robot = paper();
+    robot.safety.stop = crate::robot::StopAction::ZeroThenOff;
+    for (push_n, vanishes, least_ms, most_ms) in
+        [(0.0, false, 0, 0), (60.0, false, 50, 1000), (60.0, true, 20, 25)]
+    {
+        let mut rig = Rig::balancing(&robot, ControllerKind::Flqr, DriveSettings::default(), 4);
+        rig.arm();
+        rig.run(2.0);
+        rig.robot.push(push_n, 0.2, None);
+        rig.run(0.15);
+        let stop = rig.tick;
+        rig.step(&[DriveOrder::Stop]);
+        if vanishes {
+            rig.faults.push((stop, Fault::MotorVanishes(Motor::Left)));
+        }
+        let first = rig.outputs.last().unwrap().1.orders;
+        assert_eq!(first[0], MotorOrder::Torque([0.0; 2]));
+        for _ in 0..1100 {
+            rig.step(&[]);
+        }
+        let orders = orders_from(&rig, Duration::from_millis(stop));
+        let off = orders.iter().find(|(_, orders)| orders.contains(&MotorOrder::Off)).unwrap().0;
+        let after = off.as_millis() as u64 - stop;
+        assert!((least_ms..=most_ms).contains(&after), "{push_n} N: off {after} ms after the stop");
+        let zero = |order: &MotorOrder| [MotorOrder::Torque([0.0; 2]), MotorOrder::Off].contains(order);
+        assert!(orders.iter().flat_map(|(_, orders)| orders).all(zero));
+        assert!(vanishes || rig.drive.has_ended());
+    }
+}
+
+/// Errors and voltage are read more than 20 times a second, while checking and while driving.
+#[test]
+fn health_is_read_twenty_times_a_second() {
+    let (mut rig, armed) = armed(8);
+    rig.run(4.0);
+    let queries = |from: u64, to: u64| {
+        let within = rig.outputs.iter().filter(|(time, _)| (from..to).contains(&(time.as_millis() as u64)));
+        within.filter(|(_, output)| output.orders.contains(&MotorOrder::ReadHealth)).count()
+    };
+    assert!(queries(0, 4000) >= 4 * 20 && queries(armed, armed + 4000) >= 4 * 20);
+}
+
+/// What the protocol cannot tell is said before the robot is armed.
+#[test]
+fn the_missing_time_out_of_the_motors_is_said_before_arming() {
+    let mut rig = Rig::balancing(&paper(), ControllerKind::Lqr, DriveSettings::default(), 1);
+    let checking = rig.step(&[DriveOrder::Check]);
+    let said = checking.events.iter().any(|event| {
+        matches!(event, DriveEvent::Warning(text) if text.contains("time-out") && text.contains("keep their last torque"))
+    });
+    assert!(said, "{:?}", checking.events);
 }
