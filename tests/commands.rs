@@ -173,7 +173,7 @@ fn gains_of_the_papers_preset() {
 
 fn weight_of_torque() -> f64 {
     let text = std::fs::read_to_string(PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(PAPER)).unwrap();
-    let model = flqr_core::model_file::Model::from_toml(&text, PAPER).unwrap();
+    let model = flqr_core::model::Model::from_toml(&text, PAPER).unwrap();
     model.robot().unwrap().weights.unwrap().r[(0, 0)]
 }
 
@@ -442,7 +442,7 @@ fn a_motion_that_is_not_finite_ends_with_its_step_and_keeps_its_log() {
     let broken = paper_with("tether.toml", &[("[limits]", tether)]);
     let path = file("broken.csv", "");
     let message = refusal(&["simulate", PAPER, "--robot", &broken, "--log", &path], 1);
-    assert!(message.contains("not finite from step 1 (0.001 s) on"), "{message}");
+    assert!(message.contains("not finite from step 1 (0.001 s)"), "{message}");
     assert_eq!(std::fs::read_to_string(&path).unwrap().lines().count(), 2);
 }
 
@@ -493,7 +493,11 @@ fn gains_follow_the_legs() {
     assert!(refusal(&["gains", &legged, "--schedule", "1"], 1).contains("from 2 to 1000 heights"));
     let late = json(&["gains", &slow]);
     assert_eq!(late["margins"]["stable"], false);
-    assert!(String::from_utf8(flqr(&["gains", &slow]).stderr).unwrap().contains("flqr: warning: the loop"));
+    assert!(
+        String::from_utf8(flqr(&["gains", &slow]).stderr)
+            .unwrap()
+            .contains("flqr: warning: the sampled closed loop")
+    );
     assert!(late["warnings"][0].as_str().unwrap().contains("delay 300 ms"), "{late}");
 }
 
@@ -611,7 +615,7 @@ fn a_log_becomes_an_mcap_file() {
     assert_eq!(std::fs::read(&out).unwrap(), file);
 
     let message = refusal(&["convert", &log, "run.csv"], 1);
-    assert!(message.contains("run.csv: the last file is the one that is written"), "{message}");
+    assert!(message.contains("run.csv: the last file is the output"), "{message}");
     let frames = file_of_frames();
     let message = refusal(&["convert", &frames, "no such folder/run.mcap"], 1);
     assert!(message.contains("no such folder/run.mcap: cannot write the MCAP file"), "{message}");

@@ -117,7 +117,7 @@ fn every_signal_stops_the_robot_before_it_ends_or_suspends_the_program() {
                 let end = end(&output);
                 assert_eq!(
                     (&end["stopped_by"], &end["signal"], &end["motors_off"]),
-                    (&"asked".into(), &format!("SIG{name}").into(), &true.into())
+                    (&"requested".into(), &format!("SIG{name}").into(), &true.into())
                 );
                 assert_eq!(output.status.code(), Some(i32::from(!usual.contains(&name))), "{end}");
                 assert_eq!(end["problem"].is_null(), usual.contains(&name), "{end}");
@@ -140,7 +140,7 @@ fn a_run_that_fails_has_its_end_line_too() {
     let output = start(&csv, &["--arm"], Stdio::piped()).wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(1));
     let end = end(&output);
-    assert!(end["problem"].as_str().unwrap().contains("there is no terminal to ask on"), "{end}");
+    assert!(end["problem"].as_str().unwrap().contains("there is no terminal for the confirmation"), "{end}");
     assert!(end["recording"]["rows"].as_u64().unwrap() > 0 && end["motors_off"] == true, "{end}");
 }
 
@@ -160,7 +160,7 @@ fn a_recording_that_ends_early_is_a_problem_of_the_run() {
     assert_eq!(output.status.code(), Some(1));
     let end = end(&output);
     let problem = end["problem"].as_str().unwrap();
-    assert!(problem.contains("the recording has ended") && problem.contains("rows were lost"), "{end}");
+    assert!(problem.contains("the recording has stopped") && problem.contains("rows were lost"), "{end}");
     assert!(end["recording"]["rows_lost"].as_u64().unwrap() > 0 && end["motors_off"] == true, "{end}");
     assert_eq!(String::from_utf8(output.stderr).unwrap(), format!("flqr: {problem}\n"));
 }

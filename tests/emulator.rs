@@ -7,10 +7,12 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-use flqr_core::link::lk::{self, MotorId, Reply};
-use flqr_core::link::slcan::{self, Answer, AnswerDecoder};
-use flqr_core::link::{Frame, FrameId, jy901};
-use flqr_core::robot::StateLayout;
+use flqr_core::link::{
+    Frame, FrameId, jy901,
+    lk::{self, MotorId, Reply},
+    slcan::{self, Answer, AnswerDecoder},
+};
+use flqr_core::model::StateLayout;
 use serde_json::Value;
 
 /// `flqr emulate` with its standard input, which it watches.
@@ -169,12 +171,9 @@ fn an_imu_is_set_up_once_that_is_agreed_to() {
         if answer.get("error").is_some() { Err(message) } else { Ok(answer) }
     };
     let refused = set_up(&["--rate", "50"]).unwrap_err();
-    assert!(
-        refused.contains("at 115200 baud") && refused.contains("written, for good: 50 readings"),
-        "{refused}"
-    );
-    assert!(refused.contains("give --yes"), "{refused}");
-    assert!(set_up(&["--rate", "60", "--yes"]).unwrap_err().contains("no rate of 60 Hz"));
+    assert!(refused.contains("at 115200 baud") && refused.contains("write permanently: 50 Hz"), "{refused}");
+    assert!(refused.contains("add --yes"), "{refused}");
+    assert!(set_up(&["--rate", "60", "--yes"]).unwrap_err().contains("does not support 60 Hz"));
     let set = set_up(&["--rate", "50", "--yes"]).unwrap();
     let rate_hz = |when: &str| set[when]["rate_hz"].as_f64().unwrap();
     assert!((90.0..110.0).contains(&rate_hz("before")), "the refused one wrote nothing: {set}");
@@ -216,7 +215,7 @@ fn of_a_full_bus_no_frame_is_lost_on_the_way_to_the_client() {
     }
     host.tell(&slcan::Command::Close);
     let message = emulator.end();
-    assert!(message.contains(" 0 not taken by the SLCAN port's client"), "{message}");
+    assert!(message.contains(" 0 not read by the SLCAN client"), "{message}");
 }
 
 #[test]

@@ -2,14 +2,18 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
+#[path = "../src/core/tests/shared/skip.rs"]
+mod skip;
+
 use std::path::PathBuf;
 use std::process::Command;
 
-use flqr_core::control::{BalanceController, ControllerKind, GainSchedule, Readings, Reference};
+use flqr_core::control::{BalanceController, ControllerKind, GainSchedule, Reference};
 use flqr_core::export::{Controller, Format};
 use flqr_core::lqr;
-use flqr_core::model_file::{Model, RobotModel, presets};
-use flqr_core::robot::State;
+use flqr_core::model::{Model, RobotModel, State};
+use flqr_core::model_file::presets;
+use flqr_core::record::Readings;
 
 /// Left and right motor angle, left and right motor speed, pitch, pitch rate; x, ẋ, pitch, pitch rate and yaw to
 /// track. The fourth asks for more than the motors' limit, and two have a sensor that failed.
@@ -26,7 +30,7 @@ const ROWS: [[f64; 11]; 7] = [
 #[test]
 fn c_header_agrees_with_the_controller() {
     if no_compiler() {
-        println!("skipped: no C compiler here");
+        skip::report_skipped("install a C compiler as cc");
         return;
     }
     let model = presets::paper();
@@ -41,7 +45,7 @@ fn c_header_agrees_with_the_controller() {
 #[test]
 fn c_header_agrees_with_the_schedule() {
     if no_compiler() {
-        println!("skipped: no C compiler here");
+        skip::report_skipped("install a C compiler as cc");
         return;
     }
     let robot = legged();

@@ -58,17 +58,12 @@ fn a_recorded_run_is_replayed_at_any_speed_and_ends_by_itself() {
         assert!(last["state"]["pitch_rad"].is_f64() && last["time_s"].as_f64().unwrap() > 1.0, "{last}");
         assert!(last["bus"]["received"].as_u64().unwrap() > 1000, "{last}");
         assert_eq!((&last["bus"]["lost"], &last["loop"]["ticks"]), (&Value::from(0), &Value::from(0)));
-        assert!(
-            events.last().unwrap()["text"]
-                .as_str()
-                .unwrap()
-                .starts_with("the recording has come to its end: ")
-        );
+        assert!(events.last().unwrap()["text"].as_str().unwrap().starts_with("end of the recording: "));
         let end = lines.last().unwrap();
-        assert_eq!((&end["type"], &end["text"]), (&"end".into(), &"the recording is over".into()));
+        assert_eq!((&end["type"], &end["text"]), (&"end".into(), &"end of recording".into()));
     }
     let text = String::from_utf8(monitor(&[&source, "--speed", "0"]).stdout).unwrap();
-    assert!(text.ends_with("end: the recording is over\n"), "{text}");
+    assert!(text.ends_with("end: end of recording\n"), "{text}");
 }
 
 #[test]
@@ -78,7 +73,8 @@ fn recordings_and_speeds_that_do_not_serve_are_refused_in_a_sentence() {
     let empty = file("monitor-empty.log", "");
     let message = refusal(&[&format!("replay:{empty}")], 1);
     assert!(
-        message.ends_with("monitor-empty.log holds neither a row nor a frame: give a recording of a robot\n"),
+        message
+            .ends_with("monitor-empty.log contains neither rows nor frames: give a recording of a robot\n"),
         "{message}"
     );
     for speed in ["-1", "x", "1e9", "nan"] {
@@ -157,13 +153,13 @@ fn another_robot_is_watched_through_a_dbc_file() {
 
     let message = refusal(&[&described[..], &signals].concat(), 1);
     assert!(
-        message.contains("monitor-other.dbc: no signal is chosen for the motion of the right motor"),
+        message.contains("monitor-other.dbc: no signal is selected for the motion of the right motor"),
         "{message}"
     );
     let wrong = refusal(&[&described[..], &signals, &["--signal", "motor_speed_right=Rigth"]].concat(), 1);
     assert!(wrong.contains("the file has no signal Rigth for motor_speed_right_rad_s"), "{wrong}");
     assert!(
-        refusal(&[&described[..], &["--signal", "lean=Lean"]].concat(), 2).contains("no quantity `lean`")
+        refusal(&[&described[..], &["--signal", "lean=Lean"]].concat(), 2).contains("unknown column `lean`")
     );
     assert!(refusal(&described, 2).contains("--signal"), "a file alone says nothing");
     assert!(refusal(&[&source, "--signal", "pitch=Lean"], 2).contains("--dbc"));

@@ -1,11 +1,10 @@
-//! CAN interfaces for real. Where the kernel has no CAN the tests print `skipped`, unless `FLQR_REQUIRE_CAN` is set.
+//! Real CAN interfaces. Without them the tests are skipped and reported, and fail if `FLQR_REQUIRE_CAN` is set.
 //! They need `vcan0` and `vcan1`, up, and nobody else on them.
 #![cfg(target_os = "linux")]
-#![expect(
-    clippy::unwrap_used,
-    clippy::print_stdout,
-    reason = "a test that cannot go on fails, or says why it is skipped"
-)]
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+
+#[path = "../src/core/tests/shared/skip.rs"]
+mod skip;
 
 use std::env;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -22,7 +21,7 @@ fn wire() -> Option<MutexGuard<'static, ()>> {
     let found = device::interfaces().can;
     if found.iter().filter(|can| can.up && ["vcan0", "vcan1"].contains(&can.name.as_str())).count() < 2 {
         assert!(env::var_os("FLQR_REQUIRE_CAN").is_none(), "vcan0 and vcan1 are not up: {found:?}");
-        println!("skipped: vcan0 and vcan1 are not up");
+        skip::report_skipped("set up vcan0 and vcan1: ip link add vcan0 type vcan && ip link set vcan0 up");
         return None;
     }
     Some(WIRE.lock().unwrap_or_else(PoisonError::into_inner))
@@ -166,7 +165,7 @@ fn an_interface_that_goes_down_and_up_again_resumes_by_itself() {
     let mut bus = open("vcan1", false, &clock).unwrap();
     if !set("down") {
         assert!(env::var_os("FLQR_REQUIRE_CAN").is_none(), "vcan1 cannot be taken down");
-        println!("skipped: no leave to take vcan1 down");
+        skip::report_skipped("run it as root, which may set vcan1 down");
         return;
     }
     let down = open("vcan1", true, &clock).err().unwrap();

@@ -1,11 +1,11 @@
-//! The balance controller that a model makes.
+//! Balance controller of a model.
 
 use flqr_core::control::{BalanceController, ControllerKind};
 use flqr_core::lqr;
-use flqr_core::model_file::RobotModel;
+use flqr_core::model::RobotModel;
 
-/// The LQR design of the model under this kind of controller; by default FLQR where friction is known. The error says
-/// what the model lacks, without the model's name.
+/// Designs the controller of a model; by default FLQR if friction is declared. The error says
+/// what the model lacks, without its name.
 pub(super) fn design(robot: &RobotModel, kind: Option<ControllerKind>) -> Result<BalanceController, String> {
     let weights = robot.weights.ok_or("it has no [lqr] table: add q_diagonal and r_diagonal")?;
     let design =

@@ -1,4 +1,4 @@
-//! `flqr convert`: recordings for other programs.
+//! `flqr convert`: converts recordings for other programs.
 
 use std::ffi::OsStr;
 use std::fs::File;
@@ -19,8 +19,8 @@ use super::progress::Progress;
 
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Files of one recording: robot log or bench logs (CSV), raw frames (candump); they are merged by time. A single
-    /// robot log takes along the frames beside it
+    /// Files of one recording: robot log or bench logs (CSV), raw frames (candump); merged by time. For a single robot
+    /// log, the frame file of the same name is included
     #[arg(required = true, num_args = 2.., value_names = ["IN", "OUT.mcap"])]
     files: Vec<PathBuf>,
     #[command(flatten)]
@@ -57,18 +57,18 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     output.answer(&keys, |text| print(text, out.path, &conversion))
 }
 
-/// Refuses what is no MCAP file by its name, most of all the last file of a recording without an output.
+/// Refuses an output that is not named as an MCAP file, such as the last input of a command line without an output.
 fn check_output(out: &Path) -> Result<(), Failure> {
     if out.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("mcap")) {
         return Ok(());
     }
     Err(Failure::Output(format!(
-        "{}: the last file is the one that is written, and only MCAP is: end its name in .mcap",
+        "{}: the last file is the output and must be MCAP: end its name in .mcap",
         out.display()
     )))
 }
 
-/// The raw frames belong to their recording: a robot log alone takes along those beside it.
+/// Adds the raw frames of the same recording to a single robot log.
 fn with_frames(files: &[PathBuf]) -> Vec<PathBuf> {
     let mut all = files.to_vec();
     if let [log] = files
@@ -79,7 +79,7 @@ fn with_frames(files: &[PathBuf]) -> Vec<PathBuf> {
     all
 }
 
-/// Where columns go that are not those of a robot log.
+/// Topic of columns that do not belong to a robot log.
 fn topic(path: &Path) -> &'static str {
     let side = path.file_stem().and_then(|stem| Path::new(stem).extension()).and_then(OsStr::to_str);
     match side {
@@ -125,7 +125,7 @@ fn print(text: &mut dyn Write, out: &Path, conversion: &Conversion) -> io::Resul
         writeln!(text, "  {topic:24}{messages:>12} messages")?;
     }
     if conversion.dropped > 0 {
-        writeln!(text, "{} damaged rows and frames were left out:", conversion.dropped)?;
+        writeln!(text, "{} damaged rows and frames were skipped:", conversion.dropped)?;
     } else if !conversion.problems.is_empty() {
         writeln!(text, "problems:")?;
     }

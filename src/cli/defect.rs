@@ -1,4 +1,4 @@
-//! The end of the program where it has a defect.
+//! Handling of internal errors.
 
 use std::backtrace::{Backtrace, BacktraceStatus};
 use std::io::{self, Write};
@@ -9,14 +9,14 @@ use std::sync::{Mutex, PoisonError};
 use super::error_keys::{self, ErrorKeys};
 use super::output::complain;
 
-/// Exit code of a defect, that of `sysexits.h` for an internal error of software.
+/// Exit code of an internal error, `EX_SOFTWARE` of `sysexits.h`.
 pub(super) const EXIT_CODE: u8 = 70;
 
-/// What was said last, so that threads that meet one defect do not say it each.
+/// Last message, so that several threads do not report the same error.
 static SAID: Mutex<String> = Mutex::new(String::new());
 
-/// Runs the program. A panic ends it with one sentence and exit code 70; destructors run, so that motors are switched off
-/// and temporary files removed.
+/// Runs the program. A panic ends it with one sentence and exit code 70; destructors run, so that motors are switched
+/// off and temporary files removed.
 pub(crate) fn guard(run: impl FnOnce() -> ExitCode) -> ExitCode {
     panic::set_hook(Box::new(report));
     panic::catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|_| {
@@ -31,9 +31,8 @@ pub(crate) fn guard(run: impl FnOnce() -> ExitCode) -> ExitCode {
 fn report(panic: &PanicHookInfo) {
     let place =
         panic.location().map_or(String::new(), |place| format!(" ({}:{})", place.file(), place.line()));
-    let what = panic.payload_as_str().unwrap_or("no reason was given");
-    let sentence =
-        format!("flqr has met a defect of its own{place}: {what}: report it with the command and its files");
+    let what = panic.payload_as_str().unwrap_or("no reason given");
+    let sentence = format!("internal error{place}: {what}: report it with the command and its files");
     let mut said = SAID.lock().unwrap_or_else(PoisonError::into_inner);
     if *said != sentence {
         complain(&sentence);
@@ -55,7 +54,7 @@ mod tests {
         drop(panic::take_hook());
         assert_eq!(format!("{code:?}"), format!("{:?}", ExitCode::from(70)));
         let said = SAID.lock().unwrap().clone();
-        assert!(said.starts_with("flqr has met a defect of its own (src/cli/defect.rs:"), "{said}");
+        assert!(said.starts_with("internal error (src/cli/defect.rs:"), "{said}");
         assert!(said.ends_with("row 7 of 3: report it with the command and its files"), "{said}");
     }
 }

@@ -12,7 +12,7 @@ use super::refine;
 
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Chooses what the simulated robot has that its model lacks, and draws all noise
+    /// Random seed: selects the hidden effect and draws all noise
     #[arg(long, default_value_t = 1)]
     seed: u64,
     #[command(flatten)]
@@ -32,8 +32,8 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
 }
 
 fn print(out: &mut dyn Write, shown: &Demonstration) -> io::Result<()> {
-    writeln!(out, "1. The robot of the paper is simulated with something that its model does not have.")?;
-    writeln!(out, "2. It balances under the controller of that model and is recorded:")?;
+    writeln!(out, "1. The robot of the paper is simulated with an effect that its model does not contain.")?;
+    writeln!(out, "2. It balances with the controller designed for that model; the run is recorded:")?;
     for log in &shown.logs {
         writeln!(out, "   {}, {} rows", log.source, log.rows())?;
     }
@@ -42,16 +42,16 @@ fn print(out: &mut dyn Write, shown: &Demonstration) -> io::Result<()> {
     {
         writeln!(
             out,
-            "3. The residual of the model, {channel}, is {} {}, its noise floor {}.",
+            "3. The {channel} residual of the model is {} {}; the noise floor is {}.",
             number(error.value),
             error.unit,
             number(noise.value)
         )?;
     }
-    writeln!(out, "4. What the model lacks is looked for in the records alone:\n")?;
+    writeln!(out, "4. Missing effects are identified from the recorded data alone:\n")?;
     refine::print(out, &shown.found)?;
     let truth = &shown.truth;
-    writeln!(out, "\n5. In truth the robot had:\n\n{}{:>31}{:>14}", truth.effect.id(), "true", "found")?;
+    writeln!(out, "\n5. The simulated robot had:\n\n{}{:>31}{:>14}", truth.effect.id(), "true", "found")?;
     let own = shown.found.effects.iter().find(|effect| effect.effect.kind() == truth.effect.kind());
     for (key, value) in truth.effect.parameters() {
         let estimate = own.and_then(|own| own.effect.get(key)).map_or("not".to_owned(), number);
@@ -59,10 +59,14 @@ fn print(out: &mut dyn Write, shown: &Demonstration) -> io::Result<()> {
     }
     let like = shown.found.effects.iter().find(|found| found.ambiguous_with.contains(&truth.effect.kind()));
     match (own, like) {
-        (Some(_), _) => writeln!(out, "\nIt was found."),
+        (Some(_), _) => writeln!(out, "\nThe effect was identified."),
         (None, Some(like)) => {
-            writeln!(out, "\nIt was found as {}, which these records do not tell from it.", like.effect.id())
+            writeln!(
+                out,
+                "\nIt was identified as {}, which cannot be distinguished from it with this data.",
+                like.effect.id()
+            )
         }
-        (None, None) => writeln!(out, "\nIt was not found by its name."),
+        (None, None) => writeln!(out, "\nThe effect was not identified."),
     }
 }

@@ -20,40 +20,40 @@ use super::output::{Failure, Output, complain};
 use super::robot_lines::{End, Lines, Outcome, died};
 use super::{controller, input};
 
-/// How long the checks may take to pass, and arming from then on.
+/// Timeout of the checks, and of arming after that.
 const CHECKS_LAST: Duration = Duration::from_secs(30);
-/// Longest time after a stop until both motors have said that they are off.
+/// Timeout after a stop for both motors to confirm that they are off.
 const MOTORS_OFF_LAST: Duration = Duration::from_secs(2);
-/// Time between two orders to arm, longer than the answer to one takes to be heard.
+/// Time between two arm commands, longer than the response takes to arrive.
 const ARM_AGAIN: Duration = Duration::from_secs(1);
 
-/// Without --arm nothing is sent but queries: the checks are made and their results are printed. With --arm the robot is driven once they
-/// have passed, after a question on the terminal or with --yes. Ctrl+C, or Enter, stops it.
+/// Without --arm, only queries are sent: the checks run and their results are printed. With --arm, the robot is
+/// driven when all checks have passed, after a confirmation on the terminal or with --yes. Ctrl+C or Enter stops it.
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Where the frames come from and go to: can:INTERFACE, slcan:PORT@BITRATE, emulated
+    /// Connection to the robot: can:INTERFACE, slcan:PORT@BITRATE, emulated
     source: Source,
-    /// Model file (TOML) that makes the controller, with [link], [limits] and [safety]
+    /// Model file (TOML) that the controller is designed for, with [link], [limits] and [safety]
     model: PathBuf,
     #[command(flatten)]
     wire: Wire,
-    /// State feedback without or with friction feedforward
+    /// State feedback without (lqr) or with (flqr) friction feedforward
     #[arg(long, value_enum, default_value = "flqr")]
     controller: ControllerName,
-    /// What the motors do: balance, multisine (balance with torques on top), and with the wheels in the air
-    /// friction-sweep (constant speeds) and air-multisine
+    /// Task: balance, multisine (balance with added multisine torques); with the wheels in the air:
+    /// friction-sweep (constant speeds), air-multisine
     #[arg(long, value_enum, default_value = "balance")]
     run: RunName,
-    /// How long the robot is driven, s [default: until stopped, friction-sweep 120, air-multisine 60]
+    /// Driving time, s [default: until stopped; friction-sweep 120, air-multisine 60]
     #[arg(long, value_parser = input::seconds)]
     seconds: Option<f64>,
-    /// Drive once the checks have passed
+    /// Drive the robot when the checks have passed
     #[arg(long)]
     arm: bool,
-    /// With --arm: do not ask
+    /// With --arm: skip the confirmation
     #[arg(long, requires = "arm")]
     yes: bool,
-    /// Seed of an emulated robot's noise
+    /// Random seed of an emulated robot's noise
     #[arg(long, default_value_t = 1)]
     seed: u64,
 }
@@ -82,7 +82,7 @@ impl Arguments {
         }
     }
 
-    /// When a run that has no end of its own is stopped.
+    /// Time at which a run without a natural end is stopped.
     fn end(&self) -> Duration {
         let on_ground = matches!(self.run, RunName::Balance | RunName::Multisine);
         self.seconds.filter(|_| on_ground).map_or(Duration::MAX, Duration::from_secs_f64)
@@ -131,7 +131,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     done
 }
 
-/// Lines that the user enters, where somebody can; each stops the robot at once while `stops` is set.
+/// Lines entered on the terminal, if there is one; each stops the robot at once while `stops` is set.
 fn entered_lines(stops: Arc<AtomicBool>) -> Option<Receiver<String>> {
     if !io::stdin().is_terminal() {
         return None;
@@ -152,14 +152,14 @@ fn entered_lines(stops: Arc<AtomicBool>) -> Option<Receiver<String>> {
     Some(lines)
 }
 
-/// The course of events, from the checks to the end. Signals and Enter stop the robot without this thread, whatever it
-/// does just then.
+/// Sequence from the checks to the end. Signals and Enter stop the robot independently of
+/// this thread.
 struct Dialogue<'a> {
     arguments: &'a Arguments,
     interrupt: &'a Interrupt,
     lines: Lines<'a>,
     entered: Option<Receiver<String>>,
-    /// Whether what is entered stops the robot, and is no answer.
+    /// An entered line stops the robot instead of answering a question.
     enter_stops: Arc<AtomicBool>,
     arming: Arming,
     driven_since: Option<Duration>,
@@ -186,7 +186,7 @@ impl Dialogue<'_> {
         }
     }
 
-    /// What follows from how things stand, also where nothing new was told; why this is the end, if it is.
+    /// Advances the sequence; returns the reason if the run has ended.
     fn go_on(&mut self, status: Option<&Status>, session: &mut Session) -> Result<Option<End>, Failure> {
         let drive = status.and_then(|status| status.drive.as_ref());
         let now = status.map_or(Duration::ZERO, |status| status.time);
@@ -240,7 +240,7 @@ impl Dialogue<'_> {
         Ok(None)
     }
 
-    /// Prints the last line, and maps what the run has come to.
+    /// Prints the last line and maps the outcome to a result.
     fn conclude(
         mut self,
         time: Duration,
@@ -274,10 +274,12 @@ impl Dialogue<'_> {
         };
         let signal = self.interrupt.signal();
         match &end {
-            Some(End::Stopped(StopReason::Asked)) => {
+            Some(End::Stopped(StopReason::Requested)) => {
                 let usual = signal.is_none_or(|signal| ["SIGINT", "SIGTERM", "Ctrl+C"].contains(&signal));
                 problems.extend(
-                    signal.filter(|_| !usual).map(|signal| format!("the robot was stopped: {signal} came")),
+                    signal
+                        .filter(|_| !usual)
+                        .map(|signal| format!("the robot was stopped: received {signal}")),
                 );
             }
             Some(End::Stopped(StopReason::TimeOver | StopReason::Done)) => {}
@@ -286,7 +288,7 @@ impl Dialogue<'_> {
         }
         let Ending { motors_off, recording } = ending.unwrap_or_default();
         if !motors_off {
-            let text = "the motors have not confirmed that they are off: switch their supply off";
+            let text = "the motors have not confirmed that they are off: switch off their supply";
             problems.push(text.to_owned());
         }
         problems.extend(recording.as_ref().and_then(|recording| recording.problem.clone()));
@@ -305,21 +307,21 @@ impl Dialogue<'_> {
         self.interrupt.came() || self.entered.as_ref().is_some_and(|lines| lines.try_recv().is_ok())
     }
 
-    /// Whether the motors may get torque.
+    /// Returns whether the motors may receive torque.
     fn agreed(&mut self) -> Result<bool, Failure> {
         if self.arguments.yes {
             return Ok(true);
         }
         let Some(lines) = &self.entered else {
             let problem =
-                "the checks have passed, but there is no terminal to ask on: give --yes beside --arm";
+                "the checks have passed, but there is no terminal for the confirmation: add --yes to --arm";
             return Err(Failure::Message(problem.to_owned()));
         };
         if !std::mem::replace(&mut self.arming.asked, true) {
             // What was typed before the question does not answer it.
             lines.try_iter().for_each(drop);
             complain(
-                "the checks have passed. Hold the robot, then type drive and Enter; Enter or Ctrl+C stops it",
+                "the checks have passed. Hold the robot, then type drive and press Enter; Enter or Ctrl+C stops it",
             );
         }
         Ok(lines.try_recv().is_ok_and(|line| line.trim() == "drive"))
@@ -329,29 +331,30 @@ impl Dialogue<'_> {
     fn discard_early_answers(&self) {
         let answers = self.entered.iter().filter(|_| self.arming.asked);
         if answers.flat_map(Receiver::try_iter).count() > 0 {
-            complain("a check is open again: type drive once all have passed");
+            complain("a check no longer passes: type drive when all checks pass");
         }
     }
 }
 
-/// Where arming stands.
+/// State of arming.
 #[derive(Default)]
 struct Arming {
-    /// When the checks passed for the first time.
+    /// Time at which the checks first passed.
     ready_at: Option<Duration>,
-    /// Whether the user was asked.
+    /// The user has been asked for confirmation.
     asked: bool,
-    /// When it was ordered last.
+    /// Time of the last arm command.
     ordered_at: Option<Duration>,
 }
 
 impl Arming {
-    /// Whether the answer to an order may not have been heard yet. It is a refusal if a check has fallen open meanwhile.
+    /// Returns whether the response to an arm command may still be on its way. It is a refusal if a check has failed
+    /// meanwhile.
     fn is_on_its_way(&self, now: Duration) -> bool {
         self.ordered_at.is_some_and(|at| now.saturating_sub(at) < ARM_AGAIN)
     }
 
-    /// Whether the robot should be driven by now.
+    /// Returns whether the robot should be driving by now.
     fn is_too_late(&self, now: Duration) -> bool {
         !self.asked && now.saturating_sub(self.ready_at.unwrap_or_default()) > CHECKS_LAST
     }
@@ -374,11 +377,11 @@ fn failed_checks(drive: Option<&DriveStatus>) -> Failure {
     }
     if open.is_empty() {
         open.push(
-            "the checks pass now and then, but each order to arm found one of them open: hold it still"
+            "the checks pass only intermittently and every attempt to arm failed: hold the robot still"
                 .to_owned(),
         );
     }
-    Failure::Message(format!("the robot is not ready to be driven: {}", open.join("; ")))
+    Failure::Message(format!("the robot is not ready to drive: {}", open.join("; ")))
 }
 
 #[cfg(test)]
@@ -389,7 +392,7 @@ mod tests {
     fn arming_is_ordered_again_after_a_refusal_but_not_for_ever() {
         let seconds = Duration::from_secs_f64;
         let mut arming = Arming { ready_at: Some(seconds(5.0)), ..Arming::default() };
-        assert!(!arming.is_on_its_way(seconds(5.0)), "none was ordered");
+        assert!(!arming.is_on_its_way(seconds(5.0)), "no order was given");
         arming.ordered_at = Some(seconds(5.0));
         let on_its_way = [5.0, 5.03, 5.9, 6.0, 8.0].map(|now| arming.is_on_its_way(seconds(now)));
         assert_eq!(on_its_way, [true, true, true, false, false]);

@@ -4,10 +4,10 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::Args;
+use flqr_core::emulator::{EmulatorSettings, TimedFault};
 use flqr_core::link::lk::ReplyId;
-use flqr_core::link::{EmulatorSettings, TimedFault};
+use flqr_core::model::LinkSettings;
 use flqr_core::model_file::presets;
-use flqr_core::robot::LinkSettings;
 use serde_json::Value;
 
 use super::output::{Failure, Output};
@@ -15,47 +15,48 @@ use super::{controller, input};
 
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Model file (TOML) of the robot [default: that of the paper]
+    /// Model file (TOML) of the robot [default: the paper's robot]
     model: Option<PathBuf>,
     #[command(flatten)]
     ports: Ports,
-    /// Seed of all noise
+    /// Random seed of all noise
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// The robot balances by itself (FLQR of its model), and its controller's frames are on the bus: to listen to
+    /// Let the robot balance with its on-board controller (FLQR of its model), whose frames are on the bus, for
+    /// listening
     #[arg(long, conflicts_with = "wheels_in_air")]
     balancing: bool,
-    /// Its stand keeps the wheels off the ground
+    /// Hold the wheels off the ground on a stand
     #[arg(long)]
     wheels_in_air: bool,
-    /// Identifier that the motors answer on, 0x140 or 0x180 + number: sources disagree
+    /// Base identifier of the motors' replies, 0x140 or 0x180 (+ motor number); documentation disagrees
     #[arg(long, value_name = "ID", default_value = "0x140", value_parser = reply_id)]
     reply_id: ReplyId,
-    /// A key of [link] in which the robot is not as its model says, such as current_steps_per_a=62.5 or
-    /// pitch_direction=backward; repeatable
+    /// Wiring that differs from the model's [link] table, such as current_steps_per_a=62.5
+    /// or pitch_direction=backward; repeatable
     #[arg(long, value_name = "KEY=VALUE")]
     actual: Vec<Override>,
-    /// What goes wrong and when, such as left-vanishes@10: {left|right}-vanishes, -returns, -errors=BITS,
+    /// Fault and its time, such as left-vanishes@10: {left|right}-vanishes, -returns, -errors=BITS,
     /// -temperature=C, -encoder-frozen, -encoder-returns, -torque-reversed, -commanded=BYTE, or voltage=V, imu-silent,
     /// imu-frozen, imu-angle-frozen, imu-rate-zero, imu-angle-off=RAD, imu-returns, torques-swapped, held, released,
     /// bus-off, bus-on, push=N; repeatable
     #[arg(long, value_name = "FAULT@SECONDS")]
     fault: Vec<TimedFault>,
-    /// Frames of other devices that fill the bus, in a second; each has its number in its first four bytes
+    /// Background frames per second from other devices; the first four bytes of each are its number
     #[arg(long, value_name = "HZ", default_value_t = 0, value_parser = clap::value_parser!(u32).range(..=100_000))]
     flood: u32,
-    /// Time to run, s [default: until it is ended, or its standard input, if that is a pipe]
+    /// Running time, s [default: until it is stopped, or until standard input closes if it is a pipe]
     #[arg(long, value_parser = input::seconds)]
     seconds: Option<f64>,
 }
 
-/// Where the robot is reached. Without any of them: --slcan --imu.
+/// Ports of the robot. Default: --slcan --imu.
 #[derive(Args)]
 struct Ports {
     /// Motors on this CAN interface
     #[arg(long, value_name = "INTERFACE")]
     can: Option<String>,
-    /// Motors behind an SLCAN adapter on a pseudo-terminal
+    /// Motors on an SLCAN adapter on a pseudo-terminal
     #[arg(long)]
     slcan: bool,
     /// IMU on a pseudo-terminal
@@ -93,13 +94,13 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         Some(path) => input::load_robot(path)?,
         None => {
             let model = presets::paper();
-            let robot = model.robot().expect("the paper's preset is a robot").clone();
+            let robot = model.robot().expect("the preset of the paper describes a robot").clone();
             (model.name, robot)
         }
     };
     let on_board = arguments.balancing.then(|| {
         controller::design(&robot, None).map_err(|problem| {
-            Failure::Message(format!("--balancing needs a controller of {name}: {problem}"))
+            Failure::Message(format!("--balancing needs a controller for {name}: {problem}"))
         })
     });
     let settings = EmulatorSettings {
@@ -114,7 +115,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     serve::run(arguments, &name, &robot, settings, output)
 }
 
-/// The wiring with what differs from the model's; none if nothing does.
+/// Wiring with the differences from the model's; `None` without any.
 fn actual(declared: &LinkSettings, overrides: &[Override]) -> Result<Option<LinkSettings>, Failure> {
     if overrides.is_empty() {
         return Ok(None);
@@ -139,14 +140,14 @@ mod serve {
     use std::thread;
 
     use flqr_core::device::{EmulatorPorts, EmulatorServer};
-    use flqr_core::link::{Emulator, EmulatorSettings};
-    use flqr_core::model_file::RobotModel;
+    use flqr_core::emulator::{Emulator, EmulatorSettings};
+    use flqr_core::model::RobotModel;
     use serde::Serialize;
 
     use super::Arguments;
     use crate::cli::output::{Failure, Output, complain};
 
-    /// Keys of the JSON object; a port that is not there is left out.
+    /// Keys of the JSON object; missing ports are left out.
     #[derive(Serialize)]
     struct Opened<'a> {
         #[serde(skip_serializing_if = "Option::is_none")]
@@ -186,7 +187,7 @@ mod serve {
                 || input_ended.load(Ordering::Relaxed)
         });
         complain(&format!(
-            "{} frames of the robot, {} not taken by the SLCAN port's client, {} not by the CAN interface",
+            "{} frames sent by the robot, {} not read by the SLCAN client, {} rejected by the CAN interface",
             counts.frames, counts.slcan_dropped, counts.can_refused
         ));
         Ok(())
@@ -208,11 +209,11 @@ mod serve {
             let model = arguments.model.as_deref().unwrap_or(Path::new("presets/paper.toml"));
             format!("drive {motors} {}", model.display())
         };
-        writeln!(out, "\nin another terminal: flqr {command}{imu}")
+        writeln!(out, "\nrun in another terminal: flqr {command}{imu}")
     }
 
-    /// Tells when whoever holds the other end of standard input has closed it. Only a pipe is watched: a terminal
-    /// ends its programs itself, and a file or /dev/null has no other end.
+    /// Signals the closing of standard input. Only a pipe is watched: a terminal ends its
+    /// programs itself, and a file or /dev/null has no other end.
     fn watch_input() -> Arc<AtomicBool> {
         let ended = Arc::new(AtomicBool::new(false));
         let pipe = io::stdin().as_fd().try_clone_to_owned().map(File::from);
@@ -228,7 +229,7 @@ mod serve {
             };
             // Without the thread, the emulator runs until it is ended.
             if let Err(error) = thread::Builder::new().name("stdin".to_owned()).spawn(watch) {
-                complain(&format!("warning: the end of standard input cannot be watched: {error}"));
+                complain(&format!("warning: cannot watch standard input for its end: {error}"));
             }
         }
         ended
@@ -237,8 +238,8 @@ mod serve {
 
 #[cfg(not(unix))]
 mod serve {
-    use flqr_core::link::EmulatorSettings;
-    use flqr_core::model_file::RobotModel;
+    use flqr_core::emulator::EmulatorSettings;
+    use flqr_core::model::RobotModel;
 
     use super::Arguments;
     use crate::cli::output::{Failure, Output};
@@ -250,8 +251,8 @@ mod serve {
         _: EmulatorSettings,
         _: &Output,
     ) -> Result<(), Failure> {
-        let missing = "this system has neither pseudo-terminals nor SocketCAN: run `flqr emulate` on Linux or macOS, \
-                       or choose the source `emulated` in monitor, drive and the window";
+        let missing = "this system has neither pseudo-terminals nor SocketCAN: run `flqr emulate` on Linux \
+                       or macOS, or use the source `emulated` in monitor, drive or the window";
         Err(Failure::Message(missing.to_owned()))
     }
 }

@@ -1,4 +1,4 @@
-//! Errors as scripts read them: one JSON object on standard output.
+//! Errors for scripts: one JSON object on standard output.
 
 use std::env;
 use std::io::{self, Write};
@@ -10,19 +10,76 @@ use std::time::Duration;
 use flqr_core::message;
 use serde::Serialize;
 
-/// How long a reader of standard output that takes nothing is waited for.
-const PATIENCE: Duration = Duration::from_secs(2);
-/// Words that the advice of a message begins with.
-const ADVICE: [&str; 59] = [
-    "add", "change", "check", "choose", "close", "connect", "convert", "copy", "correct", "drive", "end",
-    "estimate", "export", "fit", "free", "give", "hold", "install", "keep", "leave", "look", "lower", "make",
-    "measure", "move", "name", "open", "plug", "press", "put", "raise", "read", "record", "reduce", "refine",
-    "remove", "rename", "repeat", "report", "run", "save", "scale", "select", "set", "shorten", "sort",
-    "split", "start", "stop", "switch", "try", "turn", "type", "unplug", "use", "wait", "widen", "write",
+/// Timeout for a reader of standard output that reads nothing.
+const PATIENCE: Duration = Duration::from_millis(300);
+/// Verbs that the remedy in a message starts with.
+const ADVICE: [&str; 63] = [
+    "add",
+    "change",
+    "map",
+    "power",
+    "reconnect",
+    "skip",
+    "check",
+    "choose",
+    "close",
+    "connect",
+    "convert",
+    "copy",
+    "correct",
+    "drive",
+    "end",
+    "estimate",
+    "export",
+    "fit",
+    "free",
+    "give",
+    "hold",
+    "install",
+    "keep",
+    "leave",
+    "look",
+    "lower",
+    "make",
+    "measure",
+    "move",
+    "name",
+    "open",
+    "plug",
+    "press",
+    "put",
+    "raise",
+    "read",
+    "record",
+    "reduce",
+    "refine",
+    "remove",
+    "rename",
+    "repeat",
+    "report",
+    "run",
+    "save",
+    "scale",
+    "select",
+    "set",
+    "shorten",
+    "sort",
+    "split",
+    "start",
+    "stop",
+    "switch",
+    "try",
+    "turn",
+    "type",
+    "unplug",
+    "use",
+    "wait",
+    "widen",
+    "write",
     "simulate",
 ];
 
-/// Whether errors are wanted as JSON, for a command line that need not be valid.
+/// Returns whether errors are requested as JSON; the command line need not be valid.
 pub(super) fn wanted() -> bool {
     env::args_os().skip(1).take_while(|argument| argument != "--").any(|argument| argument == "--json")
 }
@@ -33,14 +90,14 @@ struct Line<'a> {
     error: &'a ErrorKeys,
 }
 
-/// What an error object says; what is not known is null.
+/// Contents of an error object; unknown values are null.
 #[derive(Debug, PartialEq, Serialize)]
 pub(super) struct ErrorKeys {
     /// `usage`, `input_file`, `output_file`, `failed` or `defect`.
     code: &'static str,
     /// What is wrong, where and how to fix it, as on standard error.
     message: String,
-    /// The file that is meant, as it was named on the command line.
+    /// File that the error is about, as named on the command line.
     file: Option<String>,
     /// Line of that file, from 1.
     line: Option<u64>,
@@ -51,7 +108,7 @@ pub(super) struct ErrorKeys {
 }
 
 impl ErrorKeys {
-    /// The error of this message, which begins with the file that it is about, if it is about one.
+    /// Creates the error of a message, which starts with the name of its file if it concerns one.
     pub(super) fn new(code: &'static str, message: &str) -> Self {
         let arguments = env::args_os().skip(1).map(|argument| argument.to_string_lossy().into_owned());
         Self::of(code, message, &arguments.collect::<Vec<_>>())
@@ -72,7 +129,7 @@ impl ErrorKeys {
         }
     }
 
-    /// A wrong command line, in the words of its parser.
+    /// Creates a usage error from the text of the argument parser.
     pub(super) fn usage(text: &str) -> Self {
         let mut lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
         let what = lines.next().unwrap_or_default();
@@ -87,7 +144,7 @@ impl ErrorKeys {
         Self { remedy: tip.or_else(usage).map(message::shown), ..Self::of("usage", what, &[]) }
     }
 
-    /// Prints the object as a line of its own. Standard output that nobody reads is left after a while.
+    /// Prints the object on a separate line. Gives up after a timeout if nobody reads standard output.
     pub(super) fn print(&self) {
         let Ok(mut line) = serde_json::to_vec(&Line { error: self }) else { return };
         line.push(b'\n');
@@ -104,7 +161,7 @@ impl ErrorKeys {
     }
 }
 
-/// The file of the command line that a message begins with.
+/// Returns the file on the command line that a message starts with.
 fn file_of<'a>(message: &'a str, arguments: &[String]) -> Option<&'a str> {
     let values = arguments.iter().flat_map(|argument| {
         let value = argument.split_once('=').filter(|_| argument.starts_with('-')).map(|(_, value)| value);
@@ -120,7 +177,7 @@ fn file_of<'a>(message: &'a str, arguments: &[String]) -> Option<&'a str> {
     followed.max_by_key(|name| name.len()).map(|name| &message[..name.len()])
 }
 
-/// Line and column: behind the name of the file, or in words.
+/// Returns line and column: after the name of the file, or spelled out.
 fn place(behind_file: &str) -> (Option<u64>, Option<u64>) {
     let mut parts = behind_file.split(':').skip(1).map(|part| part.parse().ok());
     let behind = |word: &str| {
@@ -136,7 +193,7 @@ fn place(behind_file: &str) -> (Option<u64>, Option<u64>) {
     }
 }
 
-/// The advice at the end of a message.
+/// Returns the remedy at the end of a message.
 fn remedy(message: &str) -> Option<&str> {
     let begins = |text: &str| {
         let text = ["if so, ", "then ", "so ", "or "]

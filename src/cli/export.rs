@@ -1,24 +1,24 @@
-//! `flqr export`: what a robot's firmware or a script takes over.
+//! `flqr export`: exports the controller for firmware or scripts.
 
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use flqr_core::control::{BalanceController, ControllerKind, GainSchedule};
-use flqr_core::effects::Effect;
 use flqr_core::export::{Controller, Format};
+use flqr_core::model::Effect;
 use serde::Serialize;
 
 use super::output::{Failure, Output, complain};
 use super::{gains, input};
 
-/// Heights of the legs in the exported table.
+/// Number of leg heights in the exported table.
 const SCHEDULED_HEIGHTS: usize = 11;
 
 #[derive(Args)]
 pub(crate) struct Arguments {
     /// Model file (TOML) with a [robot] and an [lqr] table
     model: PathBuf,
-    /// Form of the export, written to standard output
+    /// Format, written to standard output
     #[arg(long, value_enum)]
     to: Form,
 }
@@ -63,7 +63,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     if format == Format::CHeader && !controller.effects.is_empty() {
         let ids: Vec<&str> = controller.effects.iter().map(Effect::id).collect();
         complain(&format!(
-            "the header leaves out what the model feeds forward beside friction: {}; json, yaml and csv have it",
+            "the C header contains friction feedforward only, without {}: export json, yaml or csv for all effects",
             ids.join(", ")
         ));
     }

@@ -1,4 +1,4 @@
-//! The check that a result is made of finite numbers: JSON would show any other as null.
+//! Check that all numbers of a result are finite; JSON would show others as null.
 
 use std::fmt::Display;
 
@@ -9,13 +9,13 @@ use serde::ser::{
 use serde::{Serialize, Serializer};
 use serde_json::Error;
 
-/// Gives the name of a number of `value` that is infinite or not a number, keys joined by points, if there is one.
+/// Returns the key path of a number in `value` that is infinite or NaN, if there is one.
 pub(super) fn not_finite(value: &impl Serialize) -> Option<String> {
     let mut walk = Walk { path: Vec::new() };
     value.serialize(&mut walk).err().map(|_| walk.path.join("."))
 }
 
-/// Visits all numbers of a value. It ends at one that is not finite, with the keys that lead there.
+/// Visits all numbers of a value and stops at the first that is not finite, with its key path.
 struct Walk {
     path: Vec<String>,
 }

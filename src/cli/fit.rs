@@ -1,4 +1,4 @@
-//! `flqr fit`: friction and inertia from bench logs.
+//! `flqr fit`: identifies friction and inertia from bench logs.
 
 use std::collections::BTreeMap;
 use std::io::{self, Write};
@@ -17,17 +17,17 @@ use super::progress::Progress;
 
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Logs (CSV): constant speeds, staircases or friction pairs give the Stribeck curve, any other motion
-    /// inertia or mass, viscous and Coulomb friction and offset
+    /// Logs (CSV): constant speeds, staircases or friction pairs give the Stribeck curve; any other motion
+    /// gives inertia or mass, viscous and Coulomb friction and offset
     #[arg(required = true)]
     logs: Vec<PathBuf>,
-    /// Model file (TOML) with what is known; without it the columns choose the rig
+    /// Model file (TOML) with the known parameters; without it, the columns determine the rig
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// Swarm and polish to the optimum, or the swarm alone
+    /// PSO with local refinement, or PSO only
     #[arg(long, value_enum, default_value = "best")]
     method: MethodName,
-    /// Bounds of the swarm: from the data, or the paper's Table 3 as printed
+    /// Search bounds: from the data, or from Table 3 of the paper as printed
     #[arg(long, value_enum, default_value = "data")]
     bounds: BoundsName,
     #[command(flatten)]

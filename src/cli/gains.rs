@@ -1,13 +1,12 @@
-//! `flqr gains`: the LQR design of a model.
+//! `flqr gains`: LQR design of a model.
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use flqr_core::control::{GainSchedule, ScheduleNode};
-use flqr_core::lqr::{self, LqrDesign, Margins, SampledLoop, Weights};
-use flqr_core::model_file::RobotModel;
-use flqr_core::robot::LinearModel;
+use flqr_core::lqr::{self, LqrDesign, Margins, SampledLoop};
+use flqr_core::model::{LinearModel, RobotModel, Weights};
 use serde::Serialize;
 
 use super::input;
@@ -17,10 +16,10 @@ use super::output::{self, Failure, Output};
 pub(crate) struct Arguments {
     /// Model file (TOML) with a [robot] and an [lqr] table
     model: PathBuf,
-    /// Height of the legs, m, in place of the model's own
+    /// Leg height, m, instead of the model's
     #[arg(long, value_name = "H")]
     leg_height: Option<f64>,
-    /// Also the gains at N heights over the legs' range
+    /// Also compute the gains at N leg heights
     #[arg(long, value_name = "N")]
     schedule: Option<usize>,
 }
@@ -40,7 +39,7 @@ struct Gains {
     warnings: Vec<String>,
 }
 
-/// Margins of the sampled loop; null where nothing makes it unstable.
+/// Margins of the sampled loop; null if the margin is infinite.
 #[derive(Clone, Copy, Serialize)]
 struct MarginKeys {
     gain_up: Option<f64>,
@@ -51,7 +50,7 @@ struct MarginKeys {
     stable: bool,
 }
 
-/// One height of the legs.
+/// Gain at one leg height.
 #[derive(Serialize)]
 struct Scheduled {
     leg_height_m: f64,
@@ -81,7 +80,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     output.answer(&gains, |out| print(out, &name, &design, &gains))
 }
 
-/// The design of a loaded robot; the error names the file.
+/// Designs the controller of a loaded robot; the error names the file.
 pub(crate) fn design(path: &Path, robot: &RobotModel) -> Result<LqrDesign, Failure> {
     let weights = weights(path, robot)?;
     lqr::design(&robot.parameters.linear_model(), &weights)
@@ -149,12 +148,12 @@ impl From<Margins> for MarginKeys {
 
 fn unstable(robot: &RobotModel, place: &str) -> String {
     format!(
-        "the loop is unstable as it runs{place} ({}): lower the weights in q against those in r, or shorten the delay",
+        "the sampled closed loop is unstable{place} ({}): reduce q relative to r, or shorten the delay",
         timing(robot)
     )
 }
 
-/// What the margins are for, in words.
+/// Describes the loop that the margins are for.
 fn timing(robot: &RobotModel) -> String {
     let (delay_s, imu) = (robot.torque_delay_s(), robot.with_effects_declared().sensors);
     let latency = match imu.imu_latency_s {
@@ -168,7 +167,7 @@ fn short(value: f64) -> String {
     format!("{value:.3}").trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
-/// A matrix as its rows.
+/// Returns the rows of a matrix.
 pub(crate) fn rows<R: nalgebra::Dim, C: nalgebra::Dim, S: nalgebra::RawStorage<f64, R, C>>(
     matrix: &nalgebra::Matrix<f64, R, C, S>,
 ) -> Vec<Vec<f64>> {
@@ -192,7 +191,7 @@ fn print(out: &mut dyn Write, name: &str, design: &LqrDesign, gains: &Gains) -> 
             im => writeln!(out, "  {:.4} {} {:.4} i", pole.re, if im < 0.0 { '-' } else { '+' }, im.abs())?,
         }
     }
-    writeln!(out, "\nmargins of the loop as it runs")?;
+    writeln!(out, "\nmargins of the sampled closed loop")?;
     print_margins(out, &gains.margins)?;
     if !gains.schedule.is_empty() {
         print_schedule(out, &gains.schedule)?;
@@ -207,13 +206,13 @@ fn print_margins(out: &mut dyn Write, margins: &MarginKeys) -> io::Result<()> {
     let MarginKeys { gain_up, gain_down, phase_rad, delay_s, crossover_rad_s, .. } = margins;
     let up = gain_up.map_or("any more".to_owned(), |factor| format!("{factor:.2}"));
     let delay = delay_s.map_or("any".to_owned(), |delay_s| format!("{:.1}", 1e3 * delay_s));
-    writeln!(out, "  gain   from {gain_down:.3} to {up} times")?;
+    writeln!(out, "  gain   {gain_down:.3} to {up} times")?;
     writeln!(out, "  phase  {:.1} deg at {crossover_rad_s:.1} rad/s", phase_rad.to_degrees())?;
-    writeln!(out, "  delay  {delay} ms more")
+    writeln!(out, "  delay  {delay} ms additional")
 }
 
 fn print_schedule(out: &mut dyn Write, schedule: &[Scheduled]) -> io::Result<()> {
-    writeln!(out, "\ngains over the legs' height, m")?;
+    writeln!(out, "\ngains over leg height, m")?;
     writeln!(
         out,
         "{:10}{:8}{:>14}{:>14}{:>14}{:>14}{:>11}{:>11}",

@@ -1,4 +1,4 @@
-//! `flqr imu`: sets the IMU up for balancing, for good.
+//! `flqr imu`: configures the IMU permanently.
 
 use std::io::{self, IsTerminal};
 use std::time::Duration;
@@ -10,27 +10,27 @@ use serde::Serialize;
 
 use super::output::{Failure, Output, complain};
 
-/// How long the IMU is listened to at least.
+/// Shortest listening time.
 const LISTEN: Duration = Duration::from_secs(2);
-/// How long it may be silent, s: its slowest rate is 0.2 Hz.
+/// Longest silence, s: its slowest rate is 0.2 Hz.
 const SILENT: Duration = Duration::from_secs(6);
-/// What comes within this time may have been sent before, and waited in the port.
+/// Data received within this time may have been buffered in the port.
 const OLD: Duration = Duration::from_millis(200);
-/// Share of the rate that has to be heard afterwards.
+/// Fraction of the rate that must be received afterwards.
 const RATE_SHARE: f64 = 0.9;
 
-/// Sets rate, baud rate and content (acceleration, rate and angle) of a JY901, and saves them in it.
+/// Sets output rate, baud rate and content (acceleration, rate, angle) of a JY901 and saves them in the sensor.
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Serial port with the baud rate that the IMU has now, as in serial:/dev/ttyUSB0@9600
+    /// Serial port and current baud rate of the IMU, such as serial:/dev/ttyUSB0@9600
     port: SerialAddress,
-    /// Readings a second that it is to send
+    /// New output rate, Hz
     #[arg(long, value_name = "HZ")]
     rate: f64,
-    /// Baud rate that it is to have
+    /// New baud rate
     #[arg(long)]
     baud: u32,
-    /// Do not ask before writing
+    /// Write without confirmation
     #[arg(long)]
     yes: bool,
 }
@@ -42,13 +42,13 @@ struct Report {
     after: Heard,
 }
 
-/// What an IMU sends.
+/// Data that an IMU sends.
 #[derive(Clone, Serialize)]
 struct Heard {
     baud: u32,
-    /// Angles a second.
+    /// Rate of the angles, Hz.
     rate_hz: f64,
-    /// Kinds of packets.
+    /// Types of packets.
     packets: Vec<String>,
 }
 
@@ -60,7 +60,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let before = listen(&mut imu, port.baud, LISTEN)?;
     complain(&format!("the IMU sends {}", before.text()));
     complain(&format!(
-        "to be written, for good: {rate} readings a second of acceleration, rate and angle, {baud} baud"
+        "settings to write permanently: {rate} Hz of acceleration, rate and angle at {baud} baud"
     ));
     if !yes && !agreed()? {
         return Err(Failure::Message("nothing was written".to_owned()));
@@ -69,7 +69,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let after = listen(&mut imu, baud, LISTEN.max(Duration::from_secs_f64(4.0 / rate)))?;
     if after.rate_hz < RATE_SHARE * rate {
         return Err(Failure::Message(format!(
-            "the settings were written, but the IMU sends {}: switch it off and on, then try again",
+            "the settings were written, but the IMU sends {}: power-cycle it, then try again",
             after.text()
         )));
     }
@@ -82,16 +82,16 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
 
 fn agreed() -> Result<bool, Failure> {
     if !io::stdin().is_terminal() {
-        let problem = "nothing was written, because there is no terminal to ask on: give --yes";
+        let problem = "nothing was written, because there is no terminal for the confirmation: add --yes";
         return Err(Failure::Message(problem.to_owned()));
     }
-    complain("write this? Type yes and Enter");
+    complain("write these settings? Type yes and press Enter");
     let mut answer = String::new();
     io::stdin().read_line(&mut answer)?;
     Ok(answer.trim() == "yes")
 }
 
-/// Listens for a while, longer where nothing comes.
+/// Listens for a while, longer while nothing arrives.
 fn listen(imu: &mut ImuPort, baud: u32, time: Duration) -> Result<Heard, Failure> {
     let clock = Clock::start();
     let mut decoder = Decoder::new();
@@ -100,7 +100,7 @@ fn listen(imu: &mut ImuPort, baud: u32, time: Duration) -> Result<Heard, Failure
     while clock.now() < time || (kinds.is_empty() && clock.now() < SILENT) {
         let mut bytes = [0; 1024];
         let count = imu.read(&mut bytes).map_err(|error| {
-            Failure::Message(format!("the IMU's port is lost: {error}: plug it in and try again"))
+            Failure::Message(format!("the port of the IMU is gone: {error}: reconnect it and try again"))
         })?;
         if clock.now() < OLD {
             continue;
@@ -117,8 +117,8 @@ fn listen(imu: &mut ImuPort, baud: u32, time: Duration) -> Result<Heard, Failure
     }
     if kinds.is_empty() {
         return Err(Failure::Message(format!(
-            "nothing is heard from the IMU at {baud} baud: look at its cable, and give the baud rate that it has now \
-             (9600 as delivered)"
+            "no data from the IMU at {baud} baud: check its cable and give its current baud rate \
+             (factory setting 9600)"
         )));
     }
     kinds.sort_unstable();
@@ -126,7 +126,7 @@ fn listen(imu: &mut ImuPort, baud: u32, time: Duration) -> Result<Heard, Failure
     Ok(Heard { baud, rate_hz: rate_hz(&angles), packets })
 }
 
-/// Readings a second between the first one and the last one.
+/// Returns the mean rate between the first and the last reading, Hz.
 fn rate_hz(times: &[Duration]) -> f64 {
     match times {
         [first, .., last] if last > first => (times.len() - 1) as f64 / (*last - *first).as_secs_f64(),
@@ -136,6 +136,6 @@ fn rate_hz(times: &[Duration]) -> f64 {
 
 impl Heard {
     fn text(&self) -> String {
-        format!("{:.1} angles a second ({}) at {} baud", self.rate_hz, self.packets.join(", "), self.baud)
+        format!("{:.1} Hz of angles ({}) at {} baud", self.rate_hz, self.packets.join(", "), self.baud)
     }
 }

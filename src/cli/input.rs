@@ -1,10 +1,11 @@
-//! What commands are given: files and times.
+//! Command-line inputs: files and times.
 
 use std::fs::File;
 use std::io::{self, BufReader, Read};
 use std::path::Path;
 
-use flqr_core::model_file::{Model, RobotModel};
+use flqr_core::model::{Model, RobotModel};
+use flqr_core::model_file::renamed_keys;
 
 use super::output::{Failure, complain};
 
@@ -17,7 +18,7 @@ pub(crate) fn read_text(path: &Path) -> Result<String, Failure> {
     let read = File::open(path).and_then(|file| file.take(LARGEST_TEXT + 1).read_to_string(&mut text));
     match read {
         Ok(bytes) if bytes as u64 > LARGEST_TEXT => Err(Failure::Input(format!(
-            "{}: the file is larger than the {} MiB that a text file may have: give the file that was meant",
+            "{}: the file is larger than the limit of {} MiB for text: check the path",
             path.display(),
             LARGEST_TEXT >> 20
         ))),
@@ -26,7 +27,7 @@ pub(crate) fn read_text(path: &Path) -> Result<String, Failure> {
     }
 }
 
-/// Opens a file for buffered reading; its size in bytes comes along for progress.
+/// Opens a file for buffered reading; also returns its size in bytes for progress.
 pub(crate) fn open(path: &Path) -> Result<(BufReader<File>, u64), Failure> {
     let file = File::open(path).map_err(|error| unreadable(path, &error))?;
     let about = file.metadata().map_err(|error| unreadable(path, &error))?;
@@ -36,17 +37,20 @@ pub(crate) fn open(path: &Path) -> Result<(BufReader<File>, u64), Failure> {
     Ok((BufReader::with_capacity(1 << 16, file), about.len()))
 }
 
-/// Loads a model file, and warns of values that look like a slip of the unit.
+/// Loads a model file; warns of values in an implausible unit and notes renamed keys.
 pub(crate) fn load_model(path: &Path) -> Result<Model, Failure> {
-    let model =
-        Model::from_toml(&read_text(path)?, &path.display().to_string()).map_err(Failure::from_input)?;
+    let text = read_text(path)?;
+    let model = Model::from_toml(&text, &path.display().to_string()).map_err(Failure::from_input)?;
+    for key in renamed_keys(&text) {
+        complain(&format!("note: {}: {key}", path.display()));
+    }
     for warning in model.warnings() {
         complain(&format!("warning: {}: {warning}", path.display()));
     }
     Ok(model)
 }
 
-/// The warnings of a model as text, for results that list warnings.
+/// Returns the warnings of a model as text.
 pub(crate) fn warnings_of(model: &Model) -> Vec<String> {
     model.warnings().iter().map(ToString::to_string).collect()
 }
@@ -56,7 +60,7 @@ pub(crate) fn load_robot(path: &Path) -> Result<(String, RobotModel), Failure> {
     robot_of(&load_model(path)?, path)
 }
 
-/// Name and robot of a loaded model that must describe one.
+/// Returns name and robot of a loaded model that must describe a robot.
 pub(crate) fn robot_of(model: &Model, path: &Path) -> Result<(String, RobotModel), Failure> {
     match model.robot() {
         Some(robot) => Ok((model.name.clone(), robot.clone())),
@@ -67,7 +71,7 @@ pub(crate) fn robot_of(model: &Model, path: &Path) -> Result<(String, RobotModel
     }
 }
 
-/// A time on the command line, s.
+/// Parses a time in seconds.
 pub(crate) fn seconds(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(seconds) if (0.001..=1e6).contains(&seconds) => Ok(seconds),
@@ -78,9 +82,9 @@ pub(crate) fn seconds(text: &str) -> Result<f64, String> {
 fn unreadable(path: &Path, error: &io::Error) -> Failure {
     let problem = match error.kind() {
         io::ErrorKind::NotFound => "there is no such file: check the path".to_owned(),
-        io::ErrorKind::PermissionDenied => "the file may not be read: check its permissions".to_owned(),
-        io::ErrorKind::IsADirectory => "this is a folder: give a file in it".to_owned(),
-        io::ErrorKind::InvalidData => "this is not text: give the file that was meant".to_owned(),
+        io::ErrorKind::PermissionDenied => "permission denied: check the permissions of the file".to_owned(),
+        io::ErrorKind::IsADirectory => "this is a folder: give a file".to_owned(),
+        io::ErrorKind::InvalidData => "this is not a text file: check the path".to_owned(),
         _ => format!("cannot read the file: {error}"),
     };
     Failure::Input(format!("{}: {problem}", path.display()))

@@ -1,4 +1,4 @@
-//! `flqr interfaces`: what a robot can be connected by.
+//! `flqr interfaces`: lists CAN interfaces and serial ports.
 
 use std::io::{self, Write};
 
@@ -20,7 +20,7 @@ fn print(out: &mut dyn Write, found: &Interfaces) -> io::Result<()> {
     for port in &found.serial {
         writeln!(out, "  {}", serial_line(port))?;
     }
-    writeln!(out, "\nto get a connection")?;
+    writeln!(out, "\nto set up a connection")?;
     for advice in &found.advice {
         writeln!(out, "  {}", advice.purpose)?;
         for command in &advice.commands {
@@ -37,7 +37,7 @@ fn can_line(interface: &CanInterface) -> String {
     words.extend(interface.state.map(|state| state.to_string()));
     words.extend(interface.bit_rate.map(|rate| format!("{rate} bit/s")));
     if let (Some(send), Some(receive)) = (interface.send_errors, interface.receive_errors) {
-        words.push(format!("error counters {send} sending, {receive} receiving"));
+        words.push(format!("error counters: transmit {send}, receive {receive}"));
     }
     let CanInterface { received, sent, errors, dropped, .. } = interface;
     words.push(format!("{received} received, {sent} sent, {errors} errors, {dropped} dropped"));

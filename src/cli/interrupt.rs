@@ -1,4 +1,4 @@
-//! Signals of the system: the robot is stopped before the program ends or is suspended.
+//! Signals: stop the robot before the program ends or is suspended.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
@@ -6,39 +6,39 @@ use std::time::Duration;
 
 use super::output::Failure;
 
-/// Longest time that the end or the suspension of the program waits for motors to confirm that they are off.
+/// Timeout for the motors to confirm that they are off before the program ends or is suspended.
 const MOTORS_OFF_LAST: Duration = Duration::from_secs(2);
-/// Time in which the recording of a stop gets onto the disk.
+/// Time for the recording of a stop to reach the disk.
 const RECORDED: Duration = Duration::from_millis(100);
-/// Pause between two looks at something that another thread does.
+/// Polling interval.
 const LOOK: Duration = Duration::from_millis(1);
 
-/// Whether the program is to end.
+/// Request to end the program.
 #[derive(Clone, Default)]
 pub(super) struct Interrupt(Arc<Noted>);
 
 #[derive(Default)]
 struct Noted {
     came: AtomicBool,
-    /// Number of the first signal; 0 where none came.
+    /// Number of the first signal; 0 if none was received.
     signal: AtomicI32,
-    /// Whether the program is about to be suspended, or was and has not gone on yet.
+    /// The program is about to be suspended, or has not resumed yet.
     suspends: AtomicBool,
 }
 
-/// What the program does while it watches for signals.
+/// Activity of the program while it watches for signals.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Duty {
-    /// Watches a robot, and ends at a signal as soon as it can.
+    /// Monitors a robot; ends at a signal as soon as possible.
     Monitor,
-    /// Drives a robot, which every signal stops; then the command ends.
+    /// Drives a robot; every signal stops it and ends the command.
     Drive,
     /// Shows the window: a signal stops the robot and ends the program.
     Window,
 }
 
 impl Interrupt {
-    /// Watches for signals from now on. A second one ends the program once no motor is on, whatever it is doing.
+    /// Watches for signals. A second one ends the program as soon as no motor is on.
     pub(super) fn watch(duty: Duty) -> Result<Self, Failure> {
         let interrupt = Self::default();
         system::watch(duty, interrupt.clone()).map_err(|error| {
@@ -47,24 +47,24 @@ impl Interrupt {
         Ok(interrupt)
     }
 
-    /// Notes that a signal came, unless one has come before; returns whether this is the first.
+    /// Records a signal; returns whether it is the first.
     pub(super) fn raise(&self, signal: i32) -> bool {
         let first = self.0.signal.compare_exchange(0, signal, Ordering::AcqRel, Ordering::Acquire).is_ok();
         self.0.came.store(true, Ordering::Release);
         first
     }
 
-    /// Whether one came.
+    /// Returns whether a signal was received.
     pub(super) fn came(&self) -> bool {
         self.0.came.load(Ordering::Acquire)
     }
 
-    /// Name of the signal that came first.
+    /// Returns the name of the first signal.
     pub(super) fn signal(&self) -> Option<&'static str> {
         Some(self.0.signal.load(Ordering::Acquire)).filter(|signal| *signal != 0).map(system::name)
     }
 
-    /// Waits until a suspension that was requested is over.
+    /// Waits until a requested suspension is over.
     pub(super) fn wait_for_suspension(&self) {
         while self.0.suspends.load(Ordering::Acquire) {
             std::thread::sleep(LOOK);
@@ -72,7 +72,7 @@ impl Interrupt {
     }
 }
 
-/// Stops every robot, and waits for motors that answer.
+/// Stops every robot and waits for the motors that respond.
 fn stop_robots() {
     flqr_core::device::stop_all();
     let looks = MOTORS_OFF_LAST.as_millis() / LOOK.as_millis();
@@ -102,11 +102,11 @@ mod system {
 
     use super::{Duty, Interrupt, stop_robots};
 
-    /// Signals that would suspend the program.
+    /// Signals that suspend the program.
     const SUSPEND: [i32; 3] = [SIGTSTP, SIGTTIN, SIGTTOU];
-    /// Signals by which it is asked to end.
+    /// Signals that request termination.
     const END: [i32; 4] = [SIGINT, SIGTERM, SIGHUP, SIGQUIT];
-    /// Further signals that would end it at once.
+    /// Further signals that would end it immediately.
     const KILL: [i32; 7] = [SIGUSR1, SIGUSR2, SIGXFSZ, SIGXCPU, SIGALRM, SIGVTALRM, SIGPROF];
 
     pub(super) fn watch(duty: Duty, interrupt: Interrupt) -> io::Result<()> {
@@ -140,7 +140,7 @@ mod system {
         }
     }
 
-    /// What the system does where nobody watches for the signal. Nothing is to be done where that fails.
+    /// Applies the default action of a signal. A failure cannot be handled.
     fn emulate(signal: i32) {
         emulate_default_handler(signal).unwrap_or(());
     }

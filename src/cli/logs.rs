@@ -1,18 +1,18 @@
-//! Logs as commands take them, and what the reader of a log says of its data.
+//! Log arguments and data-health output.
 
 use std::io::{self, Write};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use flqr_core::model::Motor;
 use flqr_core::record::{self, ColumnMap, HealthFinding, Log, Mapping, ReadOptions};
-use flqr_core::robot::Motor;
 
 use super::input;
 use super::output::Failure;
 use super::progress::Progress;
 
-/// A motor by its name on the command line.
+/// Motor on the command line.
 #[derive(Clone, Copy, ValueEnum)]
 pub(crate) enum MotorName {
     Left,
@@ -28,11 +28,11 @@ impl From<MotorName> for Motor {
     }
 }
 
-/// How the columns of logs are read.
+/// Column mapping of logs.
 #[derive(Args, Default, PartialEq)]
 pub(crate) struct Columns {
-    /// A column of ours from one of the file's, as in torque_nm=current_a*0.32; repeatable
-    #[arg(long, value_name = "OURS=THEIRS[*FACTOR]")]
+    /// Take a signal from a column of the file, with an optional factor, such as torque_nm=current_a*0.32; repeatable
+    #[arg(long, value_name = "SIGNAL=COLUMN[*FACTOR]")]
     pub(crate) map: Vec<Mapping>,
 }
 
@@ -60,18 +60,18 @@ fn read(path: &Path, map: &ColumnMap) -> Result<Log, Failure> {
     .map_err(Failure::from_input)
 }
 
-/// What every command is told that estimates numbers from logs.
+/// Options of commands that estimate parameters from logs.
 #[derive(Args)]
 pub(crate) struct Estimated {
-    /// Motor of a robot model that a bench log belongs to
+    /// Motor that a bench log belongs to, for a robot model
     #[arg(long, value_enum, default_value = "left")]
     pub(crate) motor: MotorName,
-    /// Numbers that the logs alone tell, whatever the model says of them: `all`, or names as in the model file
+    /// Parameters to estimate from the logs without prior: `all`, or names as in the model file
     #[arg(long, value_delimiter = ',', value_name = "NAME,...")]
     pub(crate) estimate: Vec<String>,
     #[command(flatten)]
     pub(crate) columns: Columns,
-    /// Seed of everything that is drawn
+    /// Random seed
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u64,
 }

@@ -1,4 +1,4 @@
-//! The command line: one file for each command, all over the same core functions as the window.
+//! Command line: one file per command, on the same core functions as the window.
 
 mod controller;
 mod convert;
@@ -39,18 +39,18 @@ pub(crate) use defect::guard;
 use error_keys::ErrorKeys;
 use output::{Failure, Output};
 
-/// What the help of the program ends with.
+/// Text after the program's help.
 const AFTER_HELP: &str = "\
-Exit codes: 0 done; 1 not done, or done in part; 2 wrong usage; 70 a defect of flqr; 130 interrupted. With --json an \
-error is one JSON object on standard output too: {\"error\": {code, message, file, line, column, remedy}}, null where \
-not known.
+Exit codes: 0 success; 1 failure or partial result; 2 usage error; 70 internal error; 130 interrupted. With --json, an error \
+is also printed as one JSON object on standard output: {\"error\": {code, message, file, line, column, remedy}}, null if \
+unknown.
 
-Files: an output is never a file that the command reads. It replaces earlier results of flqr and empty files; a \
-recording, or a file that flqr did not write, only with --force. Outputs are checked before the work begins.";
+Files: a command never overwrites its input. It overwrites earlier results of flqr and empty files; recordings and \
+files that flqr did not write are overwritten only with --force. Outputs are checked before the work starts.";
 
-/// Tunes the balance controller of a wheel-legged robot: friction-feedforward LQR, closed with measured data.
+/// Tunes the balance controller of a wheel-legged robot: LQR with friction feedforward, refined with measured data.
 ///
-/// Without a command it opens the window. Numbers are SI, angles in rad.
+/// Without a command, opens the window. Units are SI, angles in rad.
 #[derive(Parser)]
 #[command(name = "flqr", version, after_help = AFTER_HELP)]
 pub(crate) struct Cli {
@@ -58,56 +58,56 @@ pub(crate) struct Cli {
     command: Option<Command>,
     #[command(flatten)]
     window: window::Arguments,
-    /// Print one JSON object on standard output and nothing else there, an error too
+    /// Print one JSON object, and nothing else, on standard output; also for errors
     #[arg(long, global = true)]
     json: bool,
 }
 
 #[derive(Subcommand)]
 enum Command {
-    /// The LQR design of a model: gain, cost, poles
+    /// Design the LQR for a model: gain, cost matrix, poles
     Gains(gains::Arguments),
-    /// Solve any continuous-time algebraic Riccati equation
+    /// Solve a continuous-time algebraic Riccati equation
     Riccati(riccati::Arguments),
-    /// Friction and inertia from bench logs
+    /// Identify friction and inertia from bench logs
     Fit(fit::Arguments),
-    /// How far a model is from logs of its machine
+    /// Compute the residual of a model on logs
     Residual(residual::Arguments),
-    /// Close the loop with measured data: find what the model lacks and add it
+    /// Find the effects that a model lacks in measured data and add them
     Refine(refine::Arguments),
-    /// The whole loop in under a minute, without files or hardware: a simulated robot with a hidden effect
+    /// Run the whole loop in under a minute without files or hardware, on a simulated robot with a hidden effect
     Demo(demo::Arguments),
-    /// Run the simulated robot
+    /// Simulate a robot in a scenario
     Simulate(simulate::Arguments),
-    /// Every experiment of the paper on the simulated robot, ours beside theirs
+    /// Reproduce the experiments of the paper in simulation and compare the results
     Reproduce(reproduce::Arguments),
-    /// A simulated robot that speaks the real robot's protocols, on a CAN interface or pseudo-terminals
+    /// Emulate a robot with its real protocols on a CAN interface or pseudo-terminals
     Emulate(Box<emulate::Arguments>),
-    /// Write a recording as an MCAP file, which Foxglove, PlotJuggler and Rerun open
+    /// Convert a recording to MCAP for Foxglove, PlotJuggler and Rerun
     Convert(convert::Arguments),
-    /// Write what a robot's firmware or a script takes over
+    /// Export the controller for firmware or scripts
     Export(export::Arguments),
-    /// Watch a robot, without sending a single frame
+    /// Monitor a robot without sending any frame
     Monitor(monitor::Arguments),
-    /// Control a robot, armed in two steps and limited
+    /// Drive a robot, with two-step arming and limits
     Drive(drive::Arguments),
-    /// CAN interfaces and serial ports, and the commands that make one
+    /// List CAN interfaces and serial ports, with the commands that set one up
     Interfaces,
-    /// Set the IMU's rate and baud rate, for good
+    /// Set the output rate and baud rate of the IMU permanently
     Imu(imu::Arguments),
-    /// How late the control loop's ticks come, beside a bare timer loop on this machine
+    /// Measure the timing jitter of the control loop against a bare timer loop
     Timing(timing::Arguments),
 }
 
-/// Exit code of what was not done, or in part.
+/// Exit code of a failure or a partial result.
 const FAILED: u8 = 1;
-/// Exit code of a wrong command line.
+/// Exit code of a usage error.
 const WRONG_USAGE: u8 = 2;
 
 /// Runs the command line and maps its outcome to an exit code.
 pub(crate) fn run() -> ExitCode {
     let parsed = Cli::try_parse().and_then(|cli| {
-        let message = "the flags of the window stand alone: give a command its flags behind its name";
+        let message = "flags of the window cannot be combined with a command: put the flags of a command after its name";
         match cli.command.is_some() && cli.window != window::Arguments::default() {
             true => Err(Cli::command().error(ErrorKind::ArgumentConflict, message)),
             false => Ok(cli),
@@ -143,7 +143,7 @@ fn done(cli: Cli) -> Result<(), Failure> {
     }
 }
 
-/// Says why a command ended; gives its exit code.
+/// Reports why a command failed and returns its exit code.
 fn report(failure: Failure) -> ExitCode {
     let (code, message, exit) = match failure {
         Failure::Usage(error) => return report_usage(&error),
@@ -164,7 +164,7 @@ fn report(failure: Failure) -> ExitCode {
     ExitCode::from(exit)
 }
 
-/// Prints what is wrong with the command line, or the help that it asks for.
+/// Prints the usage error or the requested help.
 fn report_usage(error: &clap::Error) -> ExitCode {
     // Nobody reads it: the exit code says the same.
     error.print().unwrap_or(());
@@ -181,17 +181,17 @@ fn report_usage(error: &clap::Error) -> ExitCode {
 mod tests {
     use std::path::Path;
 
-    use flqr_core::control::drive::Excitation;
-    use flqr_core::control::{BalanceController, ControllerKind};
+    use flqr_core::control::{BalanceController, ControllerKind, drive::Excitation};
     use flqr_core::device::{SessionMode, SessionOptions, Source};
-    use flqr_core::identify::{Bounds, FitOptions, Method, Motor};
+    use flqr_core::identify::{Bounds, FitOptions, Method};
+    use flqr_core::model::Motor;
     use flqr_core::model_file::presets;
     use flqr_gui::command_line;
     use nalgebra::Matrix2x4;
 
     use super::*;
 
-    /// The words of a line as a shell takes them: single quotes, and a quote behind a backslash.
+    /// Splits a line as a shell does: single quotes and backslash-escaped quotes.
     fn words(line: &str) -> Vec<String> {
         let (mut words, mut word, mut quoted) = (Vec::new(), String::new(), false);
         let mut letters = line.chars();

@@ -1,4 +1,4 @@
-//! `flqr monitor`: watch a robot, without sending a single frame.
+//! `flqr monitor`: monitors a robot without sending any frame.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -16,27 +16,27 @@ use super::robot_lines::{End, Lines, Outcome, died};
 
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Where the frames come from: can:INTERFACE, slcan:PORT@BITRATE, emulated, replay:FILE
+    /// Source: can:INTERFACE, slcan:PORT@BITRATE, emulated, replay:FILE
     source: Source,
     #[command(flatten)]
     wire: Wire,
-    /// Model of the robot, for its [link] settings [default: the paper's robot]
+    /// Model file of the robot, for its [link] settings [default: the paper's robot]
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// Description (DBC file) of another robot's frames, one without LK motors; with --signal for what is to be read
+    /// DBC file that describes the frames of a robot without LK motors; with --signal
     #[arg(long, value_name = "FILE", requires = "signal")]
     dbc: Option<PathBuf>,
-    /// What a signal of the DBC file is, as in pitch=Imu.Pitch or torque_left=CurrentLeft*0.32; the column of the robot
-    /// log, with or without its unit; repeatable
-    #[arg(long, value_name = "WHAT=[MESSAGE.]SIGNAL[*FACTOR]", requires = "dbc")]
+    /// Column of the robot log (unit optional) for a signal of the DBC file, such as pitch=Imu.Pitch or
+    /// torque_left=CurrentLeft*0.32; repeatable
+    #[arg(long, value_name = "COLUMN=[MESSAGE.]SIGNAL[*FACTOR]", requires = "dbc")]
     signal: Vec<Choice>,
-    /// End after so many seconds [default: at Ctrl+C, or with the recording]
+    /// Duration, s [default: until Ctrl+C or the end of the recording]
     #[arg(long, value_parser = input::seconds)]
     seconds: Option<f64>,
-    /// Speed of a replay; 0 is as fast as possible
+    /// Replay speed factor; 0 is as fast as possible
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = speed)]
     speed: f64,
-    /// Seed of an emulated robot's noise
+    /// Random seed of an emulated robot's noise
     #[arg(long, default_value_t = 1)]
     seed: u64,
 }
@@ -47,13 +47,13 @@ impl Arguments {
     }
 }
 
-/// What `monitor` and `drive` have in common.
+/// Options common to `monitor` and `drive`.
 #[derive(Args)]
 pub(super) struct Wire {
-    /// Serial port of the IMU, as in serial:/dev/ttyUSB0@115200
+    /// Serial port of the IMU, such as serial:/dev/ttyUSB0@115200
     #[arg(long, value_name = "serial:DEV@BAUD")]
     pub(super) imu: Option<SerialAddress>,
-    /// Record the robot log to this file, and the raw frames to one of the same name that ends in .log
+    /// Record the robot log to this file and the raw frames to a file of the same name ending in .log
     #[arg(long, value_name = "OUT.csv")]
     pub(super) record: Option<PathBuf>,
 }
@@ -69,7 +69,7 @@ fn speed(text: &str) -> Result<f64, String> {
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let robot = match &arguments.model {
         Some(path) => input::load_robot(path)?.1,
-        None => presets::paper().robot().cloned().expect("the paper's preset is a robot"),
+        None => presets::paper().robot().cloned().expect("the preset of the paper describes a robot"),
     };
     let options = SessionOptions {
         source: arguments.source.clone(),

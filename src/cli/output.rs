@@ -8,22 +8,22 @@ use serde::Serialize;
 
 use super::finite;
 
-/// Why a command ended without its result, or with a part of it. A message says what, where and how to fix it.
+/// Reason why a command ended without its full result. A message says what is wrong, where, and how to fix it.
 #[derive(Debug)]
 pub(crate) enum Failure {
-    /// The command line is wrong, or asks for help.
+    /// Usage error or request for help.
     Usage(clap::Error),
-    /// It could not be done.
+    /// The command failed.
     Message(String),
-    /// A file that the command reads cannot be used.
+    /// An input file cannot be used.
     Input(String),
-    /// A file that the command writes cannot be written, or must not be.
+    /// An output file cannot be written, or must not be.
     Output(String),
-    /// A defect of flqr that it has noticed itself.
+    /// Internal error.
     Defect(String),
-    /// It was done in part: the answer is printed already.
+    /// Partial result, which has been printed.
     Partial(String),
-    /// Whoever read standard output has closed it; nothing is left to say.
+    /// Standard output was closed by its reader.
     ReaderGone,
 }
 
@@ -33,7 +33,7 @@ impl Failure {
         Self::Message(error.to_string())
     }
 
-    /// The same of a file that cannot be used.
+    /// Wraps the error of an input file that cannot be used.
     pub(crate) fn from_input(error: impl Display) -> Self {
         Self::Input(error.to_string())
     }
@@ -43,12 +43,14 @@ impl From<io::Error> for Failure {
     fn from(error: io::Error) -> Self {
         match error.kind() {
             io::ErrorKind::BrokenPipe => Self::ReaderGone,
-            _ => Self::Partial(format!("cannot write the result: {error}: check where standard output goes")),
+            _ => Self::Partial(format!(
+                "cannot write the result: {error}: check the destination of standard output"
+            )),
         }
     }
 }
 
-/// Where a command's result goes.
+/// Output of a command's result.
 pub(crate) struct Output {
     json: bool,
 }
@@ -58,7 +60,7 @@ impl Output {
         Self { json }
     }
 
-    /// Prints the answer of a command, which must be made of finite numbers; see [`Output::result`].
+    /// Prints the result of a command after checking that its numbers are finite; see [`Output::result`].
     pub(crate) fn answer<T: Serialize>(
         &self,
         value: &T,
@@ -68,7 +70,7 @@ impl Output {
         self.result(value, text)
     }
 
-    /// Prints a result, or one of many: `value` on a line of its own with `--json`, else what `text` writes.
+    /// Prints `value` as one line with `--json`, otherwise the output of `text`.
     pub(crate) fn result<T: Serialize>(
         &self,
         value: &T,
@@ -79,7 +81,7 @@ impl Output {
         Ok(out.flush()?)
     }
 
-    /// Writes to `out` what [`Output::result`] prints. Control characters of names are escaped in text, as in JSON.
+    /// Writes the output of [`Output::result`] to `out`. Control characters of names are escaped.
     pub(crate) fn write<T: Serialize>(
         &self,
         out: &mut dyn Write,
@@ -97,29 +99,29 @@ impl Output {
 }
 
 impl Output {
-    /// Whether standard output is for scripts.
+    /// Returns whether the output is JSON.
     pub(crate) fn is_json(&self) -> bool {
         self.json
     }
 }
 
-/// Refuses a result with numbers that are infinite or none.
+/// Refuses a result with infinite or NaN numbers.
 pub(crate) fn check_finite(value: &impl Serialize) -> Result<(), Failure> {
     match finite::not_finite(value) {
         None => Ok(()),
         Some(name) => Err(Failure::Message(format!(
-            "the result is out of the range of numbers ({name}): check the units of what was given, which is too large or \
-             too small"
+            "the result is not a finite number ({name}): check the units of the inputs, which are too \
+             large or too small"
         ))),
     }
 }
 
-/// Prints one line on standard error. A closed standard error is no reason to fail.
+/// Prints one line on standard error. A closed standard error is ignored.
 pub(crate) fn complain(message: &str) {
     writeln!(io::stderr().lock(), "flqr: {}", message::shown(message)).unwrap_or(());
 }
 
-/// A number with seven significant digits, in plain or exponent form whichever fits.
+/// Formats a number with seven significant digits, in decimal or exponent notation.
 pub(crate) fn number(value: f64) -> String {
     let size = value.abs();
     if size != 0.0 && !(1e-4..1e7).contains(&size) {

@@ -1,4 +1,4 @@
-//! Files that commands write: what they may replace, and how.
+//! Output files of commands.
 
 use std::fs::{self, File, Metadata};
 use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
@@ -15,22 +15,22 @@ use super::output::Failure;
 
 /// First line of the models that commands write.
 const MODEL_LINE: &str = "# Written by flqr\n";
-/// Length of the part of a file that says what wrote it, bytes.
+/// Length of the part of a file that identifies its writer, bytes.
 const OPENING: u64 = 1 << 12;
 
-/// Exit code after Ctrl+C or the end that the system asks for, as shells have it.
+/// Exit code after Ctrl+C or a termination signal, as in shells.
 const INTERRUPTED: i32 = 130;
 
-/// What may be replaced.
+/// Overwriting of files.
 #[derive(Args, Clone, Copy)]
 pub(crate) struct Force {
-    /// Replace also a recording, or a file that flqr did not write. Without it only earlier results of flqr and empty
-    /// files are replaced; a file that the command reads never is
+    /// Also overwrite recordings and files that flqr did not write. Without it, only earlier results of flqr
+    /// and empty files are overwritten. An input is never overwritten
     #[arg(long)]
     force: bool,
 }
 
-/// A file that a command writes.
+/// Output file of a command.
 #[derive(Clone, Copy)]
 pub(crate) struct OutputFile<'a> {
     pub(crate) path: &'a Path,
@@ -39,12 +39,12 @@ pub(crate) struct OutputFile<'a> {
 }
 
 impl<'a> OutputFile<'a> {
-    /// A file called `what` in messages.
+    /// Creates an output that messages call `what`.
     pub(crate) fn new(path: &'a Path, what: &'static str) -> Self {
         Self { path, what }
     }
 
-    /// Replaces the file as a whole.
+    /// Replaces the whole file.
     pub(crate) fn write(self, content: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Failure> {
         remove_temporary_files_at_interrupt();
         let buffered = |file: &mut File| {
@@ -60,7 +60,7 @@ impl<'a> OutputFile<'a> {
         self.write(|out| write!(out, "{MODEL_LINE}{toml}"))
     }
 
-    /// Renames an earlier result, so that it is not taken for one of this run; gives its new name, if there was any.
+    /// Renames an earlier result so that it is not mistaken for one of this run; returns its new name.
     pub(crate) fn put_aside(self) -> Result<Option<PathBuf>, Failure> {
         let named = |number: u32| {
             let mut name = self.path.as_os_str().to_owned();
@@ -88,8 +88,8 @@ impl<'a> OutputFile<'a> {
     }
 }
 
-/// From now on Ctrl+C, or the end that the system asks for, removes temporary files before it ends the program. Commands
-/// with a robot have a handler of their own and write no file this way.
+/// Removes temporary files when the program is interrupted. Commands with a robot
+/// have another handler and do not use this.
 fn remove_temporary_files_at_interrupt() {
     static WATCH: Once = Once::new();
     WATCH.call_once(|| {
@@ -98,9 +98,8 @@ fn remove_temporary_files_at_interrupt() {
     });
 }
 
-/// Refuses, before a command begins its work, outputs that it cannot or must not write: a file that it reads, one file
-/// for two outputs, a folder that is missing or read-only; and without `force` a recording, or a file that flqr did not
-/// write.
+/// Checks the outputs of a command before its work starts. Refuses an input, one file for two outputs,
+/// a missing or read-only folder, and without `force` a recording or a file that flqr did not write.
 pub(crate) fn check(inputs: &[&Path], outputs: &[OutputFile], force: Force) -> Result<(), Failure> {
     let read: Vec<_> = inputs.iter().filter_map(|path| Identity::of(path)).collect();
     let mut written: Vec<(Identity, &str)> = Vec::new();
@@ -108,11 +107,12 @@ pub(crate) fn check(inputs: &[&Path], outputs: &[OutputFile], force: Force) -> R
         check_replaceable(output.path).map_err(|error| output.unwritable(&error))?;
         let Some(identity) = Identity::of(output.path) else { continue };
         if read.contains(&identity) {
-            let why = format!("the {} would replace a file that is read: give another name", output.what);
+            let why = format!("the {} would overwrite an input file: choose another name", output.what);
             return Err(output.refused(&why));
         }
         if let Some((_, other)) = written.iter().find(|(other, _)| *other == identity) {
-            let why = format!("the {other} and the {} would be one file: give each a name", output.what);
+            let why =
+                format!("the {other} and the {} have the same name: give each a different name", output.what);
             return Err(output.refused(&why));
         }
         if !force.force {
@@ -123,7 +123,7 @@ pub(crate) fn check(inputs: &[&Path], outputs: &[OutputFile], force: Force) -> R
     Ok(())
 }
 
-/// Refuses to replace what is no earlier result.
+/// Refuses to overwrite anything but an earlier result.
 fn check_origin(output: OutputFile) -> Result<(), Failure> {
     let origin = match File::open(output.path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
@@ -132,19 +132,21 @@ fn check_origin(output: OutputFile) -> Result<(), Failure> {
     match origin.map_err(|error| output.unwritable(&error))? {
         Origin::Result => Ok(()),
         Origin::Recording => {
-            Err(output.refused("this is a recording and is not replaced: give another name, or --force"))
+            Err(output
+                .refused("this is a recording and is not overwritten: choose another name, or use --force"))
         }
-        Origin::Unknown => Err(output
-            .refused("this file was not written by flqr and is not replaced: give another name, or --force")),
+        Origin::Unknown => Err(output.refused(
+            "this file was not written by flqr and is not overwritten: choose another name, or use --force",
+        )),
     }
 }
 
-/// Where a file comes from.
+/// Origin of a file.
 #[derive(Debug, PartialEq)]
 enum Origin {
-    /// A command of flqr computed it, or it is empty.
+    /// Result of a command of flqr, or empty.
     Result,
-    /// flqr recorded it.
+    /// Recording of flqr.
     Recording,
     Unknown,
 }
@@ -171,10 +173,10 @@ impl Origin {
     }
 }
 
-/// What tells files apart, whatever the path that leads to them. Devices and pipes have none: they are not replaced.
+/// Identity of a file independent of its path. `None` for devices and pipes, which are not replaced.
 #[derive(Debug, PartialEq)]
 enum Identity {
-    /// Device and number of a file that exists.
+    /// Device and inode of an existing file.
     #[cfg(unix)]
     Number(u64, u64),
     Path(PathBuf),

@@ -1,4 +1,4 @@
-//! Lines for standard output from a thread of their own: whoever makes them never waits for whoever reads them.
+//! Printing of lines from a separate thread, so that a slow reader never blocks the producer.
 
 use std::io::{self, Write};
 use std::sync::Arc;
@@ -10,21 +10,21 @@ use std::time::{Duration, Instant};
 use super::interrupt::Interrupt;
 use super::output::Failure;
 
-/// Lines that may wait before those that can be spared are dropped.
+/// Queue length above which optional lines are dropped.
 const MOST_WAITING: usize = 256;
-/// Time between two looks at the reader.
+/// Polling interval of the reader.
 const LOOK: Duration = Duration::from_millis(2);
-/// How long, after an interrupt, a reader that takes no line is waited for.
-const PATIENCE: Duration = Duration::from_secs(2);
+/// Timeout after an interrupt for a reader that reads no line.
+const PATIENCE: Duration = Duration::from_millis(500);
 
 /// Prints lines in their order.
 pub(super) struct Printer {
-    /// None once all lines have been handed over.
+    /// `None` after the last line.
     lines: Option<Sender<Vec<u8>>>,
-    /// Lines that are not printed yet.
+    /// Number of lines not printed yet.
     waiting: Arc<AtomicUsize>,
     dropped: u64,
-    /// None once its failure has been told.
+    /// `None` after its failure has been reported.
     thread: Option<JoinHandle<io::Result<()>>>,
 }
 
@@ -38,7 +38,7 @@ impl Printer {
         Ok(Self { lines: Some(sender), waiting, dropped: 0, thread: Some(thread) })
     }
 
-    /// Prints a line that must not be lost, sooner or later.
+    /// Queues a line that must not be lost.
     pub(super) fn keep(&mut self, line: Vec<u8>) -> Result<(), Failure> {
         self.waiting.fetch_add(1, Ordering::Relaxed);
         match self.lines.as_ref().map(|lines| lines.send(line)) {
@@ -47,7 +47,7 @@ impl Printer {
         }
     }
 
-    /// Prints a line that can be spared, unless too many wait already.
+    /// Queues an optional line unless the queue is full.
     pub(super) fn offer(&mut self, line: Vec<u8>) -> Result<(), Failure> {
         if self.waiting.load(Ordering::Relaxed) < MOST_WAITING {
             return self.keep(line);
@@ -56,7 +56,7 @@ impl Printer {
         Ok(())
     }
 
-    /// Waits until a line that is offered is not dropped, or until an interrupt.
+    /// Waits until the queue has space, or until an interrupt.
     pub(super) fn wait_for_room(&self, interrupt: &Interrupt) {
         let lives = || self.thread.as_ref().is_some_and(|thread| !thread.is_finished());
         while self.waiting.load(Ordering::Relaxed) >= MOST_WAITING && lives() && !interrupt.came() {
@@ -64,12 +64,12 @@ impl Printer {
         }
     }
 
-    /// Lines that were spared.
+    /// Number of dropped lines.
     pub(super) fn dropped(&self) -> u64 {
         self.dropped
     }
 
-    /// Waits until all is printed; after an interrupt only for a reader that still takes lines.
+    /// Waits until all lines are printed; after an interrupt only while the reader still reads.
     pub(super) fn finish(mut self, interrupt: &Interrupt) -> Result<(), Failure> {
         self.lines = None;
         let mut left = self.waiting.load(Ordering::Relaxed);
@@ -81,18 +81,18 @@ impl Printer {
                 (left, since) = (now_left, Instant::now());
             } else if since.elapsed() > PATIENCE {
                 return Err(Failure::Message(format!(
-                    "{left} lines were not printed, because nobody takes them: read standard output"
+                    "{left} lines were not printed, because standard output is not read: read it to the end"
                 )));
             }
         }
         self.join()
     }
 
-    /// What the thread, which ends by itself, came to.
+    /// Result of the thread, which ends automatically.
     fn join(&mut self) -> Result<(), Failure> {
         let printed = self.thread.take().map_or(Ok(Ok(())), JoinHandle::join);
         let defect =
-            |_| Failure::Defect("the thread that prints has ended by a defect of flqr: report it".to_owned());
+            |_| Failure::Defect("the printing thread has failed, an internal error: report it".to_owned());
         Ok(printed.map_err(defect)??)
     }
 }
@@ -111,7 +111,7 @@ mod tests {
 
     use super::*;
 
-    /// Takes no byte while it is locked.
+    /// Accepts no byte while locked.
     #[derive(Clone, Default)]
     struct Gate(Arc<Mutex<Vec<u8>>>);
 

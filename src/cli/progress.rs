@@ -1,4 +1,4 @@
-//! A progress bar on standard error for what takes longer than a second.
+//! Progress bar on standard error for work longer than a second.
 
 use std::time::{Duration, Instant};
 
@@ -15,18 +15,18 @@ pub(crate) struct Progress {
 }
 
 impl Progress {
-    /// A bar that has not been shown yet.
+    /// Creates a bar that is not shown yet.
     pub(crate) fn new(label: impl Into<String>) -> Self {
         let bar = ProgressBar::with_draw_target(Some(1), ProgressDrawTarget::hidden());
         Self { started: Instant::now(), bar, label: label.into() }
     }
 
-    /// Moves to a share of all.
+    /// Sets the completed fraction.
     pub(crate) fn set_share(&self, share: f64) {
         self.set((1000.0 * share) as u64, 1000);
     }
 
-    /// Moves to `done` of `total` units.
+    /// Sets the progress to `done` of `total` units.
     pub(crate) fn set(&self, done: u64, total: u64) {
         if self.bar.is_hidden() && self.started.elapsed() > QUIET {
             let style = ProgressStyle::with_template("{msg} {wide_bar} {percent} % {eta}")

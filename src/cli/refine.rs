@@ -1,18 +1,18 @@
-//! `flqr refine`: what a model lacks, found in measured data and added.
+//! `flqr refine`: finds the effects that a model lacks in measured data and adds them.
 
 use std::io::{self, Write};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use flqr_core::refine::{self, ClosedLoop, Corrected, Fate, LoopRun, Options, Refinement, Verdict};
+use flqr_core::refine::{self, ClosedLoop, Corrected, LoopRun, Options, Outcome, Refinement, Verdict};
 
 use super::input;
 use super::logs::print_health;
 use super::output::{Failure, Output, check_finite, complain, number};
 use super::output_file::{self, Force, OutputFile};
 use super::progress::Progress;
-use super::residual::{Asked, print_errors};
+use super::residual::{ResidualOptions, print_errors};
 
 #[derive(Args)]
 pub(crate) struct Arguments {
@@ -21,16 +21,16 @@ pub(crate) struct Arguments {
     /// Logs (CSV) of one kind: of the robot, or of one motor or axis
     #[arg(required = true)]
     logs: Vec<PathBuf>,
-    /// Log that takes no part in the estimates and tells the error; repeatable [default: the last third of each log]
+    /// Held-out log for validation, not used in the estimates; repeatable [default: the last third of each log]
     #[arg(long, value_name = "LOG")]
     heldout: Vec<PathBuf>,
     #[command(flatten)]
-    asked: Asked,
+    options: ResidualOptions,
     #[command(flatten)]
     kept: Kept,
 }
 
-/// Where a refinement is kept.
+/// Outputs of a refinement.
 #[derive(Args)]
 pub(crate) struct Kept {
     /// Write the refined model (TOML)
@@ -58,7 +58,7 @@ impl Kept {
         output_file::check(inputs, &outputs, self.force)
     }
 
-    /// Writes the outputs, then prints the answer with `print`: it is one also where there is no model to write.
+    /// Writes the outputs, then prints the result with `print`, also if there is no model to write.
     pub(crate) fn write(
         &self,
         found: &Refinement,
@@ -77,12 +77,12 @@ impl Kept {
             return print();
         }
         let earlier = match file.put_aside()? {
-            Some(earlier) => format!(" (the file of before is now {})", earlier.display()),
+            Some(earlier) => format!(" (the previous file is now {})", earlier.display()),
             None => String::new(),
         };
         print()?;
         Err(Failure::Partial(format!(
-            "{path}: no model is written{earlier}, because the logs cannot answer: see data_health, and record again"
+            "{path}: no model is written{earlier}, because the logs are not suitable for identification: see data_health and record again"
         )))
     }
 }
@@ -91,12 +91,12 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let inputs = [&arguments.model].into_iter().chain(&arguments.logs).chain(&arguments.heldout);
     arguments.kept.check(&inputs.map(PathBuf::as_path).collect::<Vec<_>>())?;
     let model = input::load_model(&arguments.model)?;
-    let columns = &arguments.asked.estimated.columns;
+    let columns = &arguments.options.estimated.columns;
     let logs = columns.read(&arguments.logs)?;
     let held_out = columns.read(&arguments.heldout)?;
     let bar = Progress::new("refine");
     let file = arguments.kept.out.as_ref().map_or_else(String::new, |path| path.display().to_string());
-    let options = Options { model_file: file, ..arguments.asked.options() };
+    let options = Options { model_file: file, ..arguments.options.options() };
     let found = refine::refine(&model, &logs, &held_out, &options, &mut |share| {
         bar.set_share(share);
         ControlFlow::Continue(())
@@ -106,7 +106,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     arguments.kept.write(&found, || output.answer(&found, |out| print(out, &found)))
 }
 
-/// Most lines about what was tried and not added.
+/// Maximum number of rejected candidates to print.
 const MOST_LOST: usize = 8;
 
 pub(crate) fn print(out: &mut dyn Write, found: &Refinement) -> io::Result<()> {
@@ -114,11 +114,11 @@ pub(crate) fn print(out: &mut dyn Write, found: &Refinement) -> io::Result<()> {
         Verdict::ModelAdequate => "model adequate: no effect of the library explains the log better",
         Verdict::EffectsFound => "effects found",
         Verdict::UnexplainedResidual => "unexplained residual: no effect of the library explains it",
-        Verdict::DataUnfit => "data unfit: the logs cannot answer",
+        Verdict::DataUnfit => "log not suitable for identification",
     };
     writeln!(out, "{verdict}")?;
     for effect in &found.effects {
-        write!(out, "\n{}, error lower by {:.1} %", effect.effect.id(), effect.error_drop_percent)?;
+        write!(out, "\n{}, error reduction {:.1} %", effect.effect.id(), effect.error_drop_percent)?;
         print_ends(out, effect.error_drop_ci95)?;
         for (n, (key, value)) in effect.effect.parameters().iter().enumerate() {
             write!(out, "  {key:24}{:>14}", number(*value))?;
@@ -130,21 +130,21 @@ pub(crate) fn print(out: &mut dyn Write, found: &Refinement) -> io::Result<()> {
         }
         if !effect.ambiguous_with.is_empty() {
             let others: Vec<&str> = effect.ambiguous_with.iter().map(|kind| kind.id).collect();
-            writeln!(out, "  not told from {} by this log", others.join(", "))?;
+            writeln!(out, "  cannot be distinguished from {} with this log", others.join(", "))?;
         }
     }
-    for carried in &found.carried {
+    for carried in &found.transfer {
         let drop = carried.error_drop_percent;
-        write!(out, "\n{}, declared: error lower by {drop:.1} % with it", carried.id)?;
+        write!(out, "\n{}, declared: reduces the error by {drop:.1} %", carried.id)?;
         print_ends(out, carried.error_drop_ci95)?;
     }
-    let lost = found.candidates.iter().filter(|tried| tried.fate != Fate::Added);
+    let lost = found.candidates.iter().filter(|tried| tried.outcome != Outcome::Added);
     for (n, tried) in lost.take(MOST_LOST).enumerate() {
         if n == 0 {
-            writeln!(out, "\n{:45}{:>14}", "tried, not added", "error lower by")?;
+            writeln!(out, "\n{:45}{:>14}", "candidates not added", "error reduction")?;
         }
         let name = format!("{} {}", tried.kind.id, tried.detail);
-        writeln!(out, "{:45}{:>12.1} %   {}", name.trim(), tried.gain_percent, tried.fate)?;
+        writeln!(out, "{:45}{:>12.1} %   {}", name.trim(), tried.gain_percent, tried.outcome)?;
     }
     if !found.before.rmse.0.is_empty() {
         writeln!(out)?;
@@ -166,7 +166,7 @@ pub(crate) fn print(out: &mut dyn Write, found: &Refinement) -> io::Result<()> {
     print_health(out, &found.data_health)
 }
 
-/// The rest of a line with percents: their interval, where there is one.
+/// Ends a line with the interval of a percentage, if there is one.
 fn print_ends(out: &mut dyn Write, ci95: Option<[f64; 2]>) -> io::Result<()> {
     match ci95 {
         Some([low, high]) => writeln!(out, " ({low:.1} to {high:.1})"),
@@ -174,7 +174,7 @@ fn print_ends(out: &mut dyn Write, ci95: Option<[f64; 2]>) -> io::Result<()> {
     }
 }
 
-/// Declared numbers that the refined model has otherwise, or that the log does not tell.
+/// Prints declared parameters that the refined model changes, or that the log does not identify.
 fn print_parameters(out: &mut dyn Write, parameters: &[Corrected]) -> io::Result<()> {
     for (n, own) in parameters.iter().enumerate() {
         if n == 0 {
@@ -194,7 +194,7 @@ fn print_parameters(out: &mut dyn Write, parameters: &[Corrected]) -> io::Result
     if parameters.is_empty() { Ok(()) } else { writeln!(out) }
 }
 
-/// The simulated robot under both controllers, and what becomes of each effect.
+/// Prints the simulation with both controllers and the use of each effect.
 fn print_closed_loop(out: &mut dyn Write, closed_loop: &ClosedLoop) -> io::Result<()> {
     writeln!(out)?;
     if !closed_loop.scenarios.is_empty() {

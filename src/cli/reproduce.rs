@@ -1,4 +1,4 @@
-//! `flqr reproduce`: every experiment of the paper, ours beside theirs.
+//! `flqr reproduce`: reproduces the experiments of the paper.
 
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
@@ -6,7 +6,8 @@ use std::path::PathBuf;
 use std::thread;
 
 use clap::Args;
-use flqr_core::model_file::{Model, presets};
+use flqr_core::model::Model;
+use flqr_core::model_file::presets;
 use flqr_core::reproduce::{self, DEFAULT_SEEDS, Settings};
 
 use super::input;
@@ -18,13 +19,13 @@ use super::progress::Progress;
 pub(crate) struct Arguments {
     /// Model file (TOML) with a [robot] and an [lqr] table; without it, the paper's robot
     model: Option<PathBuf>,
-    /// Seed of all noise
+    /// Random seed of all noise
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Seeds of the balance experiments, from --seed on: what shows how much is chance
+    /// Number of random seeds of the balance experiments, starting at --seed; shows the random spread
     #[arg(long, value_name = "N", default_value_t = DEFAULT_SEEDS)]
     seeds: NonZeroUsize,
-    /// Threads; the result does not depend on them [default: one for each processor]
+    /// Number of threads; does not affect the result [default: one per processor]
     #[arg(long, value_name = "N")]
     threads: Option<NonZeroUsize>,
     /// Write the report with its figures as one HTML file
@@ -61,12 +62,12 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
             file.write(|out| out.write_all(found.document.to_html().as_bytes()))?;
             complain(&format!("the report with its figures is in {}", file.path.display()));
         }
-        None => complain("the figures are in the report: --report OUT.html writes it"),
+        None => complain("to see the figures, write the report with --report OUT.html"),
     }
     output.answer(&found, |out| out.write_all(found.document.to_text().as_bytes()))
 }
 
-/// The model and its file's text, in which comments say where its numbers come from.
+/// Loads the model and the text of its file, whose comments give the sources of its numbers.
 fn load(arguments: &Arguments) -> Result<(Model, String), Failure> {
     match &arguments.model {
         Some(path) => Ok((input::load_model(path)?, input::read_text(path)?)),

@@ -1,4 +1,4 @@
-//! `flqr residual`: how far a model is from logs of its machine.
+//! `flqr residual`: computes the residual of a model on logs.
 
 use std::io::{self, Write};
 use std::ops::ControlFlow;
@@ -20,29 +20,29 @@ pub(crate) struct Arguments {
     #[arg(required = true)]
     logs: Vec<PathBuf>,
     #[command(flatten)]
-    asked: Asked,
+    options: ResidualOptions,
 }
 
-/// What `residual` and `refine` are asked of logs.
+/// Options common to `residual` and `refine`.
 #[derive(Args)]
-pub(crate) struct Asked {
+pub(crate) struct ResidualOptions {
     #[command(flatten)]
     pub(crate) estimated: Estimated,
-    /// Speeds of an axis or motor that count, either way, rad/s or m/s; the filters see all of the log
+    /// Range of absolute speeds of an axis or motor to use, rad/s or m/s; the filters use the whole log
     #[arg(long, value_name = "LOW..HIGH", value_parser = range)]
     speeds: Option<[f64; 2]>,
 }
 
-/// Two numbers as LOW..HIGH.
+/// Parses two numbers as LOW..HIGH.
 fn range(text: &str) -> Result<[f64; 2], String> {
     let ends = text.split_once("..").map(|(low, high)| [low, high].map(|end| end.trim().parse::<f64>()));
     match ends {
         Some([Ok(low), Ok(high)]) => Ok([low, high]),
-        _ => Err("give two numbers, as 0..9".to_owned()),
+        _ => Err("give two numbers, such as 0..9".to_owned()),
     }
 }
 
-impl Asked {
+impl ResidualOptions {
     pub(crate) fn options(&self) -> Options {
         Options {
             motor: self.estimated.motor.into(),
@@ -56,9 +56,9 @@ impl Asked {
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
     let model = input::load_model(&arguments.model)?;
-    let logs = arguments.asked.estimated.columns.read(&arguments.logs)?;
+    let logs = arguments.options.estimated.columns.read(&arguments.logs)?;
     let bar = Progress::new("residual");
-    let found = refine::residual(&model, &logs, &arguments.asked.options(), &mut |share| {
+    let found = refine::residual(&model, &logs, &arguments.options.options(), &mut |share| {
         bar.set_share(share);
         ControlFlow::Continue(())
     })
@@ -76,10 +76,10 @@ fn print(out: &mut dyn Write, found: &Residual) -> io::Result<()> {
     print_health(out, &found.data_health)
 }
 
-/// One kind of error.
+/// One column of errors.
 type Kind = fn(&Errors) -> &refine::Channels;
 
-/// A line for each channel, with a column for each of the errors.
+/// Prints one line per channel with one column per kind of error.
 pub(crate) fn print_errors(out: &mut dyn Write, errors: &[(&str, &Errors)]) -> io::Result<()> {
     if errors.iter().any(|(title, _)| !title.is_empty()) {
         let titles: String = errors.iter().map(|(title, _)| format!("{title:>14}")).collect();
@@ -88,7 +88,7 @@ pub(crate) fn print_errors(out: &mut dyn Write, errors: &[(&str, &Errors)]) -> i
     let kinds: [(&str, Kind); 3] = [
         ("residual", |errors| &errors.rmse),
         ("noise floor of the residual", |errors| &errors.noise_floor),
-        ("residual by the torque or force itself", |errors| &errors.nrmse),
+        ("relative to the torque or force", |errors| &errors.nrmse),
     ];
     for (title, kind) in kinds {
         let Some((_, first)) = errors.first() else { return Ok(()) };
@@ -107,7 +107,7 @@ pub(crate) fn print_errors(out: &mut dyn Write, errors: &[(&str, &Errors)]) -> i
     print_predictions(out, errors)
 }
 
-/// Errors of short predictions, with the noise and the motion itself beside them.
+/// Prints the errors of short predictions with the noise and the motion.
 fn print_predictions(out: &mut dyn Write, errors: &[(&str, &Errors)]) -> io::Result<()> {
     let Some((_, first)) = errors.first() else { return Ok(()) };
     for (index, prediction) in first.prediction.iter().enumerate() {
@@ -115,12 +115,13 @@ fn print_predictions(out: &mut dyn Write, errors: &[(&str, &Errors)]) -> io::Res
         write!(out, "{what:45}")?;
         for (_, errors) in errors {
             let own = errors.prediction.get(index);
-            let shown = own.map(|own| if own.told { number(own.rmse.value) } else { "-".to_owned() });
+            let shown = own.map(|own| if own.informative { number(own.rmse.value) } else { "-".to_owned() });
             write!(out, "{:>14}", shown.unwrap_or_default())?;
         }
         let last = errors.last().and_then(|(_, last)| last.prediction.get(index)).unwrap_or(prediction);
         let (noise, motion) = (number(last.noise_floor.value), number(last.motion.value));
-        let why = if last.told { "" } else { ": noise at the start alone grows beyond the motion" };
+        let why =
+            if last.informative { "" } else { ": amplified noise of the initial state exceeds the motion" };
         writeln!(out, " {} (noise {noise}, motion {motion}{why})", prediction.rmse.unit)?;
     }
     Ok(())

@@ -1,4 +1,4 @@
-//! `flqr riccati`: any continuous-time algebraic Riccati equation.
+//! `flqr riccati`: solves a continuous-time algebraic Riccati equation.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -28,7 +28,7 @@ struct Problem {
     b: Option<Rows>,
     r: Option<Rows>,
     g: Option<Rows>,
-    /// Keys that mean nothing here; a cross term of the cost would be one of them.
+    /// Unknown keys, such as a cross term of the cost.
     #[serde(flatten)]
     unknown: BTreeMap<String, IgnoredAny>,
 }
@@ -101,7 +101,7 @@ fn matrix(key: &str, rows: Rows) -> Result<DMatrix<f64>, String> {
     let columns = rows.first().map_or(0, Vec::len);
     if let Some((index, row)) = rows.iter().enumerate().find(|(_, row)| row.len() != columns) {
         return Err(format!(
-            "`{key}` is not a matrix: row 1 has {columns} numbers and row {} has {}: make all rows equally long",
+            "`{key}` is not a matrix: row 1 has {columns} numbers and row {} has {}: give all rows the same length",
             index + 1,
             row.len()
         ));

@@ -1,4 +1,4 @@
-//! What `monitor` and `drive` print: one object a line, or a line of text now and then.
+//! Output of `monitor` and `drive`: one JSON object per line, or periodic lines of text.
 
 use std::io::{self, Write};
 use std::time::Duration;
@@ -19,10 +19,10 @@ const JSON_INTERVAL: Duration = Duration::from_millis(100);
 /// Time between two lines of text.
 const TEXT_INTERVAL: Duration = Duration::from_secs(1);
 
-/// What is to be said where a session's thread has ended without being asked to.
+/// Message for a session thread that has ended unexpectedly.
 pub(super) fn died() -> String {
-    "the session's thread has ended unexpectedly, which is a defect of flqr: make sure that the motors are off, and \
-     report it"
+    "the session thread has ended unexpectedly, an internal error: make sure that the motors are off, \
+     and report it"
         .to_owned()
 }
 
@@ -33,21 +33,21 @@ pub(super) struct Lines<'a> {
     newest: Option<Sample>,
     checks: Vec<Check>,
     printer: Printer,
-    /// Where given, a slow reader is waited for until this interrupt: nothing is lost but time.
+    /// If given, waits for a slow reader until this interrupt instead of dropping lines.
     patience: Option<Interrupt>,
 }
 
-/// Why there is nothing more to tell.
+/// Reason for the end.
 pub(super) enum End {
     /// The robot was stopped.
     Stopped(StopReason),
-    /// A recording has come to its end.
+    /// End of the recording.
     Recording,
-    /// As long as was asked for.
+    /// The requested time has passed.
     Time,
-    /// Ctrl+C, or the system, before the robot was driven.
+    /// Interrupted before the robot was driven.
     Interrupt,
-    /// The checks have passed, and more was not asked for.
+    /// The checks have passed and arming was not requested.
     Checked,
 }
 
@@ -55,10 +55,10 @@ impl End {
     fn text(&self) -> String {
         match self {
             Self::Stopped(reason) => reason.to_string(),
-            Self::Recording => "the recording is over".to_owned(),
-            Self::Time => "the time is over".to_owned(),
-            Self::Interrupt => "it was interrupted".to_owned(),
-            Self::Checked => "the checks have passed; --arm would drive the robot".to_owned(),
+            Self::Recording => "end of recording".to_owned(),
+            Self::Time => "time elapsed".to_owned(),
+            Self::Interrupt => "interrupted".to_owned(),
+            Self::Checked => "the checks have passed; add --arm to drive the robot".to_owned(),
         }
     }
 }
@@ -84,21 +84,21 @@ enum Line<'a> {
         text: String,
         #[serde(flatten)]
         outcome: OutcomeLine,
-        /// Status lines that nobody took in time.
+        /// Number of dropped status lines.
         lines_dropped: u64,
     },
 }
 
-/// What a run has come to, beyond why it ended.
+/// Outcome of a run besides the reason for its end.
 #[derive(Default)]
 pub(super) struct Outcome {
-    /// What was not done, or in part.
+    /// Problem, if any.
     pub(super) problem: Option<String>,
-    /// The signal by which the program was asked to end.
+    /// Signal that requested termination.
     pub(super) signal: Option<&'static str>,
-    /// Whether the motors have confirmed that they are off; of a run that may drive.
+    /// Confirmation that the motors are off, of a run that may drive.
     pub(super) motors_off: Option<bool>,
-    /// The complete recording.
+    /// Complete recording.
     pub(super) recording: Option<RecordingStatus>,
 }
 
@@ -201,18 +201,18 @@ struct RecordingLine {
 }
 
 impl<'a> Lines<'a> {
-    /// Lines whose reader is never waited for. A slow one loses status lines, which are counted, and nothing else.
+    /// Creates a printer that never waits. A slow reader loses status lines only, which are counted.
     pub(super) fn start(output: &'a Output) -> Result<Self, Failure> {
         let printer = Printer::start(io::stdout())?;
         Ok(Self { output, next: Duration::ZERO, newest: None, checks: Vec::new(), printer, patience: None })
     }
 
-    /// Lines whose reader is waited for until an interrupt.
+    /// Creates a printer that waits for its reader until an interrupt.
     pub(super) fn patient(output: &'a Output, interrupt: &Interrupt) -> Result<Self, Failure> {
         Ok(Self { patience: Some(interrupt.clone()), ..Self::start(output)? })
     }
 
-    /// Events and checks that have changed at once, the status when it is due.
+    /// Prints changed events and checks at once, the status periodically.
     pub(super) fn update(&mut self, update: &Update) -> Result<(), Failure> {
         for event in &update.events {
             let kind = event.kind.name();
@@ -235,8 +235,8 @@ impl<'a> Lines<'a> {
         Ok(())
     }
 
-    /// The last line, also of a run that failed; `end` is `None` where the outcome's problem is all that there is to
-    /// say.
+    /// Prints the last line, also of a failed run; `end` is `None` if the problem of the outcome says
+    /// it all.
     pub(super) fn end(&mut self, time: Duration, end: Option<&End>, outcome: Outcome) -> Result<(), Failure> {
         let stopped_by = if let Some(End::Stopped(reason)) = end { Some(reason.name()) } else { None };
         let time_s = time.as_secs_f64();
@@ -248,14 +248,14 @@ impl<'a> Lines<'a> {
             if lines_dropped > 0 {
                 writeln!(
                     out,
-                    "{time_s:9.3} s  {lines_dropped} lines were dropped, because nobody took them in time"
+                    "{time_s:9.3} s  {lines_dropped} lines were dropped, because they were not read in time"
                 )?;
             }
             writeln!(out, "{time_s:9.3} s  end: {text}")
         })
     }
 
-    /// Waits until all is printed; after an interrupt only for a reader that still takes lines.
+    /// Waits until all lines are printed; after an interrupt only while the reader still reads.
     pub(super) fn finish(self, interrupt: &Interrupt) -> Result<(), Failure> {
         self.printer.finish(interrupt)
     }
@@ -416,7 +416,7 @@ fn text(out: &mut dyn Write, status: &Status, newest: Option<&Sample>) -> io::Re
     match &status.connection {
         Connection::Connected => {}
         Connection::Silent { hint } => write!(out, "silent ({hint})  ")?,
-        Connection::Lost { reason } => write!(out, "lost ({reason}), trying again  ")?,
+        Connection::Lost { reason } => write!(out, "lost ({reason}), reconnecting  ")?,
         Connection::Ended => write!(out, "ended  ")?,
     }
     if let Some(drive) = &status.drive {
@@ -452,7 +452,7 @@ fn text(out: &mut dyn Write, status: &Status, newest: Option<&Sample>) -> io::Re
         }
     }
     if let Some(problem) = status.recording.as_ref().and_then(|recording| recording.problem.as_ref()) {
-        write!(out, "  recording ended: {problem}")?;
+        write!(out, "  recording stopped: {problem}")?;
     }
     writeln!(out)
 }

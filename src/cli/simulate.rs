@@ -1,4 +1,4 @@
-//! `flqr simulate`: the simulated robot in a scenario.
+//! `flqr simulate`: simulates a robot in a scenario.
 
 use std::fmt::Display;
 use std::io::{self, Write};
@@ -8,10 +8,8 @@ use std::str::FromStr;
 
 use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, ValueEnum};
-use flqr_core::identify::Motor;
-use flqr_core::model_file::Model;
+use flqr_core::model::{Model, Motor, Payload, State};
 use flqr_core::record;
-use flqr_core::robot::{Payload, State};
 use flqr_core::simulate::{
     self, BenchRun, ControllerChoice, Experiment, ExperimentError, Outcome, Push, Run, Scenario, SpeedGains,
     Statistics, StepResponse, Summary,
@@ -27,44 +25,45 @@ use super::{Cli, input};
 
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Model file (TOML) that makes the controller: a [robot], or a rotary [axis] for experiments in the air
+    /// Model file (TOML) that the controller is designed for: a [robot], or a rotary [axis] for experiments with the
+    /// wheels in the air
     model: PathBuf,
-    /// What the robot is put through. On the ground: flat (let go 0.05 rad off upright), bridge (drives onto a
-    /// single-sided one), kick, cruise (out and back), station (stands), multisine (torques on top of the
-    /// controller's). Wheels in the air: speed-tracking, friction-sweep, and multisine with pi
+    /// Scenario. On the ground: flat (released at 0.05 rad), bridge (single-sided), kick, cruise (out and back),
+    /// station (station keeping), multisine (added to the controller's torques). Wheels in the air: speed-tracking,
+    /// friction-sweep, and multisine with pi
     #[arg(long, value_name = "NAME", default_value = "flat")]
     scenario: Scenario,
-    /// State feedback without or with friction feedforward; in the air lqr and pi are PI speed control, flqr
-    /// the same with friction feedforward
+    /// State feedback without (lqr) or with (flqr) friction feedforward; in the air, lqr and pi are PI speed
+    /// control and flqr adds friction feedforward
     #[arg(long, value_enum, default_value = "flqr")]
     controller: ControllerName,
     /// Simulated time, s, at most 3600 [default: 60, friction-sweep 120]
     #[arg(long, value_parser = duration, allow_negative_numbers = true)]
     seconds: Option<f64>,
-    /// Write the run as a robot log, in the air as a bench log of one motor
+    /// Write the run as a robot log; in the air, as a bench log of one motor
     #[arg(long, value_name = "OUT.csv")]
     log: Option<PathBuf>,
     #[command(flatten)]
     force: Force,
-    /// Seed of all noise
+    /// Random seed of all noise
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Motor of the bench log and of its statistics, in the air [default: left]
     #[arg(long, value_enum)]
     motor: Option<MotorName>,
-    /// Gain of the speed control in the air, N m s/rad, with --ki [default: by scenario]
+    /// Proportional gain of the speed control in the air, N m s/rad, with --ki [default: by scenario]
     #[arg(long, requires = "ki", value_parser = not_negative)]
     kp: Option<f64>,
     /// Integral gain of the speed control in the air, N m/rad, with --kp
     #[arg(long, requires = "kp", value_parser = not_negative)]
     ki: Option<f64>,
-    /// Model file of the robot that is simulated, where it is not the one that makes the controller
+    /// Model file of the simulated robot, if it differs from the controller's model
     #[arg(long, value_name = "ACTUAL.toml")]
     robot: Option<PathBuf>,
-    /// Gain of each motor in place of the design: x, x_dot, pitch, pitch_rate
+    /// Gain of each motor instead of the design: x, x_dot, pitch, pitch_rate
     #[arg(long, value_name = "K1,K2,K3,K4", allow_hyphen_values = true)]
     gain: Option<MotorGain>,
-    /// Height of the legs in place of the model's, m
+    /// Leg height instead of the model's, m
     #[arg(long, value_name = "M")]
     leg_height: Option<f64>,
     #[command(flatten)]
@@ -81,7 +80,7 @@ fn wrong_usage(refused: impl Display) -> Failure {
     Failure::Usage(Cli::command().error(ErrorKind::ArgumentConflict, refused))
 }
 
-/// What a scenario itself can be told.
+/// Settings of a scenario.
 #[derive(Args)]
 struct ScenarioSettings {
     /// Target of speed-tracking, rad/s [default: 5]
@@ -93,19 +92,19 @@ struct ScenarioSettings {
     /// Duration of the kick, s [default: 0.1]
     #[arg(long, value_name = "S")]
     kick_duration: Option<f64>,
-    /// Slope of the ground, upward in the direction of x, rad, on top of the model's [default: 0]
+    /// Slope of the ground, positive uphill in x, rad, added to the model's [default: 0]
     #[arg(long, value_name = "RAD", allow_negative_numbers = true)]
     slope: Option<f64>,
-    /// Load on the body that the controller does not know of, kg
+    /// Payload on the body, unknown to the controller, kg
     #[arg(long, value_name = "KG")]
     payload: Option<f64>,
-    /// Where that load sits: above the axle along the body, m [default: the centre of mass]
+    /// Height of the payload above the axle along the body, m [default: the centre of mass]
     #[arg(long, value_name = "M", allow_negative_numbers = true, requires = "payload")]
     payload_height: Option<f64>,
-    /// Torques of the multisine on the ground, as a share of the usual ones [default: 1]
-    #[arg(long, value_name = "SHARE")]
+    /// Scale factor of the multisine torques on the ground [default: 1]
+    #[arg(long, value_name = "FACTOR")]
     torque_scale: Option<f64>,
-    /// Where the kick acts: above the axle along the body, m [default: the centre of mass]
+    /// Height of the kick above the axle along the body, m [default: the centre of mass]
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     kick_height: Option<f64>,
     /// Time of the kick, s [default: 8.5]
@@ -131,7 +130,7 @@ impl FromStr for MotorGain {
         let numbers: Result<Vec<f64>, _> = text.split(',').map(|entry| entry.trim().parse()).collect();
         let entries = numbers.ok().and_then(|numbers| <[f64; 4]>::try_from(numbers).ok());
         let finite = entries.filter(|entries| entries.iter().all(|entry| entry.is_finite()));
-        finite.map(Self).ok_or_else(|| "it must be four numbers, as in -0.6,-0.9,-6.6,-0.6".to_owned())
+        finite.map(Self).ok_or_else(|| "it must be four numbers, such as -0.6,-0.9,-6.6,-0.6".to_owned())
     }
 }
 
@@ -139,7 +138,7 @@ impl FromStr for MotorGain {
 #[derive(Serialize)]
 struct Simulated<'a> {
     statistics: Quantities,
-    /// None in the air, where nothing can settle in this sense.
+    /// `None` in the air, where settling is not defined.
     settled: Option<bool>,
     fell: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -190,7 +189,8 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         return Err(wrong_usage(refused));
     }
     if experiment.on_ground() && arguments.motor.is_some() {
-        let refused = "--motor has no effect on the ground, where a log holds both: leave it out";
+        let refused =
+            "--motor applies in the air only, because a log on the ground contains both motors: leave it out";
         return Err(wrong_usage(refused));
     }
     let inputs: Vec<&Path> =
@@ -241,7 +241,7 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     }
 }
 
-/// What was run, in a line.
+/// Describes the run in one line.
 fn title(experiment: &Experiment, declared: &Model, actual: &Model) -> String {
     let Experiment { scenario, controller, seconds, seed, .. } = experiment;
     let robot = if declared == actual { String::new() } else { format!(" on {:?}", actual.name) };
@@ -309,7 +309,7 @@ fn report_ground(output: &Output, title: &str, run: &Run, warnings: &[String]) -
         ));
     }
     output.answer(&keys, |out| {
-        writeln!(out, "{title}; from {from_s} s on, target x {} m\n", run.target_x_m)?;
+        writeln!(out, "{title}; from {from_s} s, target x {} m\n", run.target_x_m)?;
         table(out, &[("x, m", x_m), ("x_dot, m/s", x_dot_m_s), ("pitch, rad", pitch_rad)])?;
         writeln!(out, "\nsettled: {}, fell: {}", yes(settled), yes(fell))
     })

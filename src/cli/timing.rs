@@ -1,4 +1,4 @@
-//! `flqr timing`: how late the control loop's ticks come, beside a bare timer loop on the same machine.
+//! `flqr timing`: measures the timing jitter of the control loop against a bare timer loop.
 
 use std::io::{self, Write};
 use std::ops::ControlFlow;
@@ -21,10 +21,10 @@ use super::progress::Progress;
 
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Length of each run, s, with the checks before the robot is driven
+    /// Length of each run, s, including the checks before driving
     #[arg(long, default_value_t = 20, value_parser = RangedU64ValueParser::<u64>::new().range(10..=3600))]
     seconds: u64,
-    /// Runs of each loop; they alternate
+    /// Number of runs of each loop; they alternate
     #[arg(long, default_value_t = 5, value_parser = RangedU64ValueParser::<u64>::new().range(1..=1000))]
     runs: u64,
 }
@@ -58,10 +58,10 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     output.result(&report, |out| print(out, &report, plan))
 }
 
-/// The paper's robot behind its real bytes, driven by FLQR.
+/// Emulates the paper's robot with its real protocols, driven by FLQR.
 fn options() -> Result<SessionOptions, Failure> {
     let model = presets::paper();
-    let robot = model.robot().expect("the paper's preset is a robot").clone();
+    let robot = model.robot().expect("the preset of the paper describes a robot").clone();
     let controller =
         Box::new(controller::design(&robot, Some(ControllerKind::Flqr)).map_err(Failure::Message)?);
     Ok(SessionOptions {
@@ -91,7 +91,7 @@ fn print(out: &mut dyn Write, report: &Report, plan: TimingPlan) -> io::Result<(
     let priority = if report.real_time_priority { "real-time" } else { "usual" };
     writeln!(
         out,
-        "lateness of ticks at 1000 Hz, {} alternated runs of {} s each, {priority} priority; µs\n",
+        "timing jitter at 1000 Hz, {} alternating runs of {} s each, {priority} priority; µs\n",
         plan.runs,
         plan.run.as_secs()
     )?;
@@ -101,5 +101,5 @@ fn print(out: &mut dyn Write, report: &Report, plan: TimingPlan) -> io::Result<(
         let [p50, p99, max] = [p50_s, p99_s, max_s].map(|seconds| 1e6 * seconds);
         writeln!(out, "{name:14}{p50:>10.1}{p99:>10.1}{max:>10.1}{ticks:>10}{skipped:>10}")?;
     }
-    writeln!(out, "\nratio of p99, median of the runs: {:.3}", report.p99_ratio)
+    writeln!(out, "\nratio of 99th percentiles, median of the runs: {:.3}", report.p99_ratio)
 }

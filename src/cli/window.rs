@@ -1,4 +1,4 @@
-//! Without a command: the window.
+//! Window, opened without a command.
 
 use std::path::PathBuf;
 
@@ -22,22 +22,22 @@ pub(crate) struct Arguments {
     log: Option<PathBuf>,
     #[command(flatten)]
     columns: Columns,
-    /// Tab to begin with
+    /// Tab to show first
     #[arg(long, value_enum)]
     tab: Option<TabName>,
-    /// Robot to connect to at once, listening only: can:can0, slcan:/dev/ttyACM0@1000000, emulated, replay:FILE
+    /// Robot to connect to at start, listen-only: can:can0, slcan:/dev/ttyACM0@1000000, emulated, replay:FILE
     #[arg(long, value_name = "SOURCE")]
     source: Option<Source>,
-    /// IMU of a robot on CAN, as serial:/dev/ttyUSB0@115200
+    /// IMU of a robot on CAN, such as serial:/dev/ttyUSB0@115200
     #[arg(long, value_name = "serial:DEV@BAUD")]
     imu: Option<SerialAddress>,
     /// Start with the simulated robot paused
     #[arg(long)]
     paused: bool,
-    /// Session file to open: model, weights, layout and sources as they were
+    /// Session file to open (model, weights, layout and sources)
     #[arg(long, value_name = "FILE", conflicts_with_all = ["model", "log", "source"])]
     session: Option<PathBuf>,
-    /// Keep what the window shows in this file, as JSON, for scripts that drive the window
+    /// Write the state of the window to this file as JSON, for scripts
     #[arg(long, value_name = "FILE")]
     state_out: Option<PathBuf>,
 }
@@ -74,7 +74,7 @@ pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
     let warning = (!has_folders).then(|| {
         let name = if cfg!(windows) { "LOCALAPPDATA and APPDATA" } else { "HOME" };
         format!(
-            "session or recent files will not be kept, because {name} is empty or not set: set it to a folder"
+            "the session and recent files will not be saved, because {name} is empty or not set: set it to a folder"
         )
     });
     if let Some(warning) = &warning {

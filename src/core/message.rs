@@ -10,6 +10,10 @@ const BEGINNING: usize = 320;
 const DIGITS: usize = 12;
 
 /// Makes a message fit to be shown: [`escaped`], numbers of at most 12 significant digits, at most 500 characters.
+///
+/// ```
+/// assert_eq!(flqr_core::message::shown("0.30000000000000004 N m\u{7}"), "0.3 N m\\u{7}");
+/// ```
 pub fn shown(message: &str) -> String {
     shortened(&rounded(&escaped(message)))
 }

@@ -1,7 +1,7 @@
 //! The one data-parallel map of the house: its result does not depend on the number of threads.
 #![expect(
     clippy::disallowed_methods,
-    reason = "the one place where the core starts threads; they end before the function does, and no result depends on them"
+    reason = "the only place in the core that starts threads; they end before the function returns, and no result depends on them"
 )]
 
 use std::num::NonZeroUsize;
@@ -14,6 +14,13 @@ use std::{panic, thread};
 ///
 /// `f` must not depend on anything but its item, so that the result is the same on any number of threads. A panic
 /// in `f` goes on in the caller.
+///
+/// ```
+/// use std::num::NonZeroUsize;
+///
+/// let two = NonZeroUsize::MIN.saturating_add(1);
+/// assert_eq!(flqr_core::parallel::map(&[1, 2, 3], two, |n| n * n), [1, 4, 9]);
+/// ```
 pub fn map<T: Sync, R: Send>(items: &[T], threads: NonZeroUsize, f: impl Fn(&T) -> R + Sync) -> Vec<R> {
     map_watched(items, threads, f, &mut |_| ControlFlow::Continue(()))
         .expect("a watch that never breaks off leaves no item out")

@@ -1,7 +1,7 @@
 //! The owner of everything: session, design, running robot, jobs. Views read it and send commands.
 
 mod apply;
-mod keep;
+mod persistence;
 mod questions;
 mod shell;
 
@@ -11,10 +11,10 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use egui::{Context, Event, Ui};
-use flqr_core::control::ControllerKind;
-use flqr_core::control::drive::Stage;
+use flqr_core::control::{ControllerKind, drive::Stage};
 use flqr_core::device::{Event as DeviceEvent, EventKind};
-use flqr_core::model_file::Model;
+use flqr_core::model::Model;
+use flqr_core::model_file::RenamedKey;
 
 use crate::column_map::ColumnMapForm;
 use crate::command::{Command, Commands, FilePurpose, Source};
@@ -26,6 +26,7 @@ use crate::document::{Base, Content, Document, Opened, Store, Undo};
 use crate::experiments::ExperimentsTab;
 use crate::frames::Frames;
 use crate::friction::FrictionTab;
+use crate::help::Help;
 use crate::history::{Channel, History};
 use crate::job::{Job, Outcome, Waker};
 use crate::layout::{Layout, Node};
@@ -45,7 +46,7 @@ use crate::write_file::Saved;
 
 /// A model file job: what it is for, and its result.
 enum ModelJob {
-    Load(PathBuf, Job<(), Result<Model, String>>),
+    Load(PathBuf, Job<(), Result<(Model, Vec<RenamedKey>), String>>),
     Save(PathBuf, Session, Job<(), Result<Saved, String>>),
 }
 
@@ -63,15 +64,15 @@ pub struct App {
     ledgers: Vec<Ledger>,
     opening: Option<Job<(), Opened>>,
     store: Option<Store>,
-    session_job: Option<keep::SessionJob>,
+    session_job: Option<persistence::SessionJob>,
     question: Option<questions::Question>,
     /// Questions for when that one is answered.
     waiting: VecDeque<questions::Question>,
-    /// What there was before anything was read; none once that has been.
+    /// State before anything was read; `None` afterwards.
     beginning: Option<Box<Document>>,
     /// The answer that has the keyboard's focus.
     question_focus: Option<&'static str>,
-    /// The file dialog was asked for where no path field is in view.
+    /// The file dialog was requested where no path field is in view.
     asks_path: bool,
     leave_after_save: bool,
     leaving: bool,
@@ -83,8 +84,9 @@ pub struct App {
     tab: Tab,
     layout: Layout,
     palette: Option<Palette>,
+    help: Option<Help>,
     source: Source,
-    /// What the simulated robot goes back to when it is shown again.
+    /// State that the simulated robot resumes.
     paused_before: bool,
     designer: Designer,
     live: Live,
@@ -117,7 +119,7 @@ impl App {
     /// # Errors
     /// The system gives no thread.
     pub fn new(mut options: WindowOptions, ctx: &Context) -> std::io::Result<Self> {
-        options.model_path = options.model_path.map(keep::absolute);
+        options.model_path = options.model_path.map(persistence::absolute);
         crate::theme::apply(ctx);
         let waker: Waker = {
             let ctx = ctx.clone();
@@ -145,7 +147,7 @@ impl App {
             undo: Undo::new(content, base),
             ledger: 0,
             ledgers: vec![Ledger::default()],
-            opening: keep::open_store(options.state_folder, &waker)?,
+            opening: persistence::open_store(options.state_folder, &waker)?,
             store: None,
             session_job: None,
             question: None,
@@ -164,6 +166,7 @@ impl App {
             tab: options.tab,
             layout,
             palette: None,
+            help: None,
             source: Source::default(),
             paused_before: options.paused,
             designer,
@@ -217,7 +220,7 @@ impl App {
         Ok(app)
     }
 
-    /// Applies what views asked for, and takes in what threads have brought. Draws nothing.
+    /// Applies what views requested, and takes in what threads have brought. Draws nothing.
     pub fn logic(&mut self, ctx: &Context) {
         self.release_status(ctx);
         self.drain_live();
@@ -251,7 +254,7 @@ impl App {
         }
     }
 
-    /// What decides which commands can be given.
+    /// Conditions for the availability of commands.
     fn situation(&self, ctx: &Context) -> Situation<'_> {
         Situation {
             tab: self.tab,
@@ -371,7 +374,7 @@ impl App {
         }
         match now {
             Stage::Listening => self.say("Listening: nothing is sent."),
-            Stage::Checking => self.say("Checking: the motors are asked for readings, without torque."),
+            Stage::Checking => self.say("Checking: the querying the motors, without torque."),
             Stage::Driving => self.say("Driving: Esc and Space stop the robot."),
             Stage::Stopped(reason) => self.fail(format!("Stopped: {reason}.")),
         }
@@ -399,7 +402,7 @@ impl App {
         if let Some((path, model)) = self.refine.take_saved_model()
             && model == self.session.model()
         {
-            self.note_saved(keep::absolute(path), self.session.clone());
+            self.note_saved(persistence::absolute(path), self.session.clone());
         }
         if let Some(job) = &mut self.recent_job {
             match job.poll().1 {
@@ -432,7 +435,7 @@ impl App {
             Outcome::Running => return,
             Outcome::Done(answer) => answer,
             Outcome::Broken => {
-                Answer::Unavailable("The file dialog failed: type the path instead.".to_owned())
+                Answer::Unavailable("The file dialog failed. Type the path instead.".to_owned())
             }
         };
         self.dialog = None;
@@ -527,7 +530,7 @@ impl App {
 
     fn robot_and_controller(
         &self,
-    ) -> Option<(flqr_core::model_file::RobotModel, flqr_core::control::BalanceController)> {
+    ) -> Option<(flqr_core::model::RobotModel, flqr_core::control::BalanceController)> {
         let gain = self.designer.in_force?.design.gain;
         Some((self.session.robot()?.clone(), self.session.balance_controller(gain)?))
     }
@@ -545,7 +548,7 @@ impl App {
         }
     }
 
-    /// What the window shows, as `--state-out` writes it.
+    /// State of the window for `--state-out`.
     pub fn snapshot(&self) -> serde_json::Value {
         let weights = self.session.weights();
         let design = self.designer.in_force.map(|designed| designed.design);
@@ -567,6 +570,7 @@ impl App {
             "undo": self.undo.undoable().collect::<Vec<_>>(),
             "redo": self.undo.redoable().collect::<Vec<_>>(),
             "tour": self.tour.map(Tour::number),
+            "manual": self.help.as_ref().map(Help::snapshot),
             "leaving": self.leaving,
             "layout": self.layout.node().to_value(),
             "source": self.source.key(),

@@ -43,10 +43,10 @@ impl ColumnMapForm {
         {
             let mut text = self.0.borrow_mut();
             let field = TextEdit::singleline(&mut *text)
-                .hint_text("column map: ours=theirs*factor; …")
+                .hint_text("column map: signal=column*factor; …")
                 .desired_width(f32::INFINITY);
             ui.add(field).accessible_name("column map").on_hover_text(
-                "For files with other column names or units: ours=theirs*factor, several separated by “;”.\nExample: torque_nm=current_a*0.32; motor_angle_rad=Angle (rad)",
+                "For files with other column names or units: signal=column*factor, separated by “;”.\nExample: torque_nm=current_a*0.32; motor_angle_rad=Angle (rad)",
             );
         }
         if let Err(problem) = self.parse() {

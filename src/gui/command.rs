@@ -1,14 +1,12 @@
-//! What views ask for; applied at one place, `App::logic`.
+//! Requests of views, applied in one place, `App::logic`.
 
 use std::cell::RefCell;
 use std::path::PathBuf;
 
 use flqr_core::control::ControllerKind;
 use flqr_core::device::{SessionOrder, Source as DeviceSource};
-use flqr_core::effects::Effect;
 use flqr_core::friction::{Compensation, Stribeck};
-use flqr_core::lqr::Weights;
-use flqr_core::robot::RobotParameters;
+use flqr_core::model::{Effect, RobotParameters, Weights};
 
 use crate::experiments::SavedAs;
 use crate::layout::Side;
@@ -17,7 +15,7 @@ use crate::refine::{RefineCommand, RefineFile};
 use crate::runs::RunsCommand;
 use crate::tab::Tab;
 
-/// Where measured values come from.
+/// Source of measured values.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Source {
     /// The simulated robot.
@@ -36,15 +34,11 @@ pub(crate) enum Source {
 impl Source {
     /// All, in the order in which they are offered, with a word of help.
     pub(crate) const ALL: [(Self, &'static str, &'static str); 5] = [
-        (Self::Simulated, "simulated", "The simulated robot, in this program"),
-        (
-            Self::Emulated,
-            "emulated",
-            "The simulated robot behind the real bytes: try everything without hardware",
-        ),
+        (Self::Simulated, "simulated", "Simulated robot in this program"),
+        (Self::Emulated, "emulated", "Emulated robot with the real protocols, without hardware"),
         (Self::Can, "CAN", "A robot on a CAN interface of this system"),
-        (Self::Slcan, "SLCAN", "A robot behind a CAN adapter on a serial port"),
-        (Self::Replay, "replay", "A recording, through the same path as live data"),
+        (Self::Slcan, "SLCAN", "A robot on a CAN adapter at a serial port"),
+        (Self::Replay, "replay", "Replay of a recording, processed like live data"),
     ];
 
     /// Name for people.
@@ -77,7 +71,7 @@ pub(crate) enum Target {
     Both,
 }
 
-/// What a file dialog is for.
+/// Purpose of a file dialog.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum FilePurpose {
     OpenModel,
@@ -96,7 +90,7 @@ pub(crate) enum FilePurpose {
 #[derive(Clone, Debug)]
 pub(crate) enum Command {
     SelectTab(Tab),
-    /// Gives a page a tile of its own, or takes it back to the others.
+    /// Gives a page a separate tile, or takes it back to the others.
     MoveTab(Tab, Side),
     ResetLayout,
     SetDark(bool),
@@ -124,7 +118,7 @@ pub(crate) enum Command {
     SetFriction([Option<Stribeck>; 2]),
     SetTorqueLimit(Option<f64>),
     SetCompensation(Compensation),
-    /// What the model has beside its declared numbers.
+    /// Effects of the model.
     SetEffects(Vec<Effect>),
     SetController(ControllerKind),
     SetPaused(bool),
@@ -150,6 +144,8 @@ pub(crate) enum Command {
     Redo,
     ShowSteps,
     StartTour,
+    /// Opens the manual at the description of the page in view.
+    ShowManual,
     /// Copies the command that does in a terminal what the page shows.
     CopyLine,
     /// Copies what makes a run of the ledger again in a terminal.
@@ -181,9 +177,9 @@ pub(crate) enum Command {
     Disconnect,
     /// Applies the design to the connected robot, after a question if its gains change much.
     ApplyGains,
-    /// The same without a question.
+    /// Same without a confirmation.
     ConfirmGains,
-    /// Whether a driven robot gets new gains as they change.
+    /// True if a driven robot gets new gains as they change.
     FollowGains(bool),
     /// Stops the robot and closes the window.
     StopAndQuit,
@@ -193,13 +189,13 @@ pub(crate) enum Command {
     ChooseReplay(PathBuf),
     /// Chooses the file to record to.
     ChooseRecording(PathBuf),
-    /// Where a figure is saved to, or why no dialog has said so.
+    /// Path of a figure, or the reason why there is none.
     ChooseFigure(FigureFile, Result<PathBuf, String>),
     /// Changes the ledger of runs.
     Runs(RunsCommand),
     /// One sentence for the status line.
     Say(String),
-    /// The same of something that went wrong.
+    /// Adds an error message.
     Complain(String),
 }
 

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use flqr_core::control::ControllerKind;
-use flqr_core::control::drive::Excitation;
+use flqr_core::control::{ControllerKind, drive::Excitation};
 use flqr_core::device::{SessionMode, SessionOptions, Source};
-use flqr_core::identify::{Bounds, FitOptions, Method, Motor};
+use flqr_core::identify::{Bounds, FitOptions, Method};
+use flqr_core::model::Motor;
 use flqr_core::record::Mapping;
 
 use crate::shell_word::quoted;
@@ -73,7 +73,7 @@ pub fn fit(
     line.flag("--seed", options.seed.to_string()).0
 }
 
-/// What the connection to a robot does: watch, or drive. Arming stays to be asked for.
+/// Commands of a robot connection: watch, or drive. Arming stays to be requested.
 pub fn robot(
     options: &SessionOptions,
     signals: &[&str],

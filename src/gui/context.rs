@@ -1,4 +1,4 @@
-//! What a view may read during one frame.
+//! Data that a view may read during one frame.
 
 use std::path::Path;
 

@@ -2,8 +2,8 @@
 
 use std::time::{Duration, Instant};
 
-use flqr_core::lqr::{DesignError, LqrDesign, Margins, SampledLoop, Weights, design, margins};
-use flqr_core::robot::{LinearModel, RobotParameters};
+use flqr_core::lqr::{DesignError, LqrDesign, Margins, SampledLoop, design, margins};
+use flqr_core::model::{LinearModel, RobotParameters, Weights};
 
 use crate::session::Session;
 
@@ -24,7 +24,7 @@ pub(crate) struct Designed {
     pub(crate) margins: Margins,
 }
 
-/// The two designs that are compared. One is in force and edited, the other waits.
+/// The two designs that are compared. One is active and edited, the other waits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Slot {
     /// At the start, the design of the loaded model.
@@ -49,35 +49,35 @@ impl Slot {
     }
 }
 
-/// How the two designs stand beside each other, for undo.
+/// State of the two designs, for undo.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Comparison {
     /// Of the other design.
     pub(crate) weights: Option<Weights>,
-    /// Which of the two is in force.
+    /// Which of the two is active.
     pub(crate) active: Slot,
 }
 
-/// The design in force, the last problem, and the design to compare with.
+/// The design active, the last problem, and the design to compare with.
 #[derive(Default)]
 pub(crate) struct Designer {
     tried: Option<(RobotParameters, Weights, SampledLoop)>,
-    /// The last design that worked; it stays in force while `problem` is set.
+    /// The last design that worked; it stays active while `problem` is set.
     pub(crate) in_force: Option<Designed>,
-    /// Why the present weights and parameters give no design.
+    /// Reason why the current weights and parameters give no design.
     pub(crate) problem: Option<String>,
     /// Duration of the last solve, s.
     pub(crate) solve_s: f64,
     /// The other design, for the same robot.
     pub(crate) reference: Option<Designed>,
-    /// Which of the two is in force.
+    /// Which of the two is active.
     pub(crate) active: Slot,
     /// Number of designs so far.
     pub(crate) count: u64,
 }
 
 impl Designer {
-    /// Solves anew when the input differs from the last one; says whether the gains in force changed.
+    /// Solves anew when the input differs from the last one; says whether the gains active changed.
     pub(crate) fn update(&mut self, session: &Session) -> bool {
         let Some(robot) = session.robot() else {
             *self = Self::default();
@@ -97,7 +97,7 @@ impl Designer {
         Comparison { weights: self.reference.map(|reference| reference.weights), active: self.active }
     }
 
-    /// Takes over how the two designs stood beside each other; the one in force stays.
+    /// Takes over how the two designs stood next to each other; the one active stays.
     pub(crate) fn compare(&mut self, comparison: Comparison) {
         self.active = comparison.active;
         if let (Some(in_force), Some(weights)) = (self.in_force, comparison.weights) {
@@ -135,13 +135,13 @@ impl Designer {
         }
     }
 
-    /// The other design, where it differs from the one in force.
+    /// The other design, where it differs from the one active.
     pub(crate) fn different(&self) -> Option<Designed> {
         let in_force = self.in_force?;
         self.reference.filter(|reference| reference.design != in_force.design)
     }
 
-    /// Makes the other design the same as the one in force.
+    /// Makes the other design the same as the one active.
     pub(crate) fn keep(&mut self) {
         self.reference = self.in_force;
     }

@@ -1,4 +1,4 @@
-//! File dialogs on a thread of their own, and an honest word when the desktop has none.
+//! File dialogs on a separate thread, and an honest word when the desktop has none.
 //!
 //! Without a desktop portal the dialog library returns the same "nothing chosen" as for Cancel, at once. So
 //! the portal is looked for first, and an answer faster than a person can give counts as a failure.
@@ -14,7 +14,7 @@ use crate::refine::RefineFile;
 /// Nobody sees and cancels a dialog faster than this.
 const FASTEST_PERSON: Duration = Duration::from_millis(150);
 
-/// What to do where no dialog opens.
+/// Advice if no dialog opens.
 fn instead(purpose: FilePurpose) -> &'static str {
     match purpose {
         FilePurpose::SaveModel
@@ -31,7 +31,7 @@ fn instead(purpose: FilePurpose) -> &'static str {
     }
 }
 
-/// What a dialog came back with.
+/// Result of a dialog.
 #[derive(Debug, PartialEq)]
 pub(crate) enum Answer {
     Chosen(PathBuf),
@@ -103,7 +103,7 @@ pub(crate) fn missing_portal() -> Option<&'static str> {
     None
 }
 
-/// Why there can be no dialog: no session bus, or nothing on it that offers one.
+/// Reason why no dialog is available: no session bus, or nothing on it that offers one.
 #[cfg(target_os = "linux")]
 pub(crate) fn missing_portal() -> Option<&'static str> {
     let set = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty());

@@ -1,9 +1,9 @@
-//! What the frames of the window took, for scripts that watch it.
+//! Frame times of the window, for scripts.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-/// How far back the longest frame is looked for.
+/// Time window of the longest frame.
 const MEMORY: Duration = Duration::from_secs(10);
 
 /// Number and times of the frames that were drawn.
@@ -28,7 +28,7 @@ impl Frames {
         }
     }
 
-    /// How many there were, and what the longest of the last ten seconds took.
+    /// Number of frames and the longest of the last ten seconds.
     pub(crate) fn to_value(&self) -> serde_json::Value {
         let longest = self.longest.front().map(|(_, seconds)| (1e4 * seconds).round() / 10.0);
         serde_json::json!({ "drawn": self.drawn, "longest_ms": longest })

@@ -1,4 +1,4 @@
-//! What is wrong with data, in plain sentences with the mend.
+//! Data-health findings with their remedies.
 
 use egui::{ProgressBar, RichText, Ui};
 use flqr_core::record::{HealthFinding, Severity};
@@ -10,7 +10,7 @@ use crate::widgets::{error_ui, warning_ui};
 /// Line problems that are shown one by one.
 const SHOWN_PROBLEMS: usize = 3;
 
-/// How far loading has come; nothing while nothing is loaded.
+/// Progress of loading; empty while nothing is loaded.
 pub(crate) fn progress_ui(loader: &Loader, ui: &mut Ui) {
     if !loader.is_running() {
         return;
@@ -23,7 +23,7 @@ pub(crate) fn progress_ui(loader: &Loader, ui: &mut Ui) {
     ui.add(ProgressBar::new(share).text(RichText::new(text).small()));
 }
 
-/// What is wrong with a log that was loaded, or that nothing is.
+/// Problems of a loaded log, or their absence.
 pub(crate) fn log_ui(loaded: &LoadedLog, ui: &mut Ui) {
     if let Err(problem) = &loaded.kind {
         error_ui(ui, problem);
@@ -31,7 +31,7 @@ pub(crate) fn log_ui(loaded: &LoadedLog, ui: &mut Ui) {
     let harmless = loaded.health.iter().all(|finding| finding.severity == Severity::Info);
     if harmless && loaded.kind.is_ok() && loaded.log.problem_count == 0 {
         let color = palette(ui.visuals()).good;
-        ui.label(RichText::new("nothing wrong was found").small().color(color));
+        ui.label(RichText::new("no problems found").small().color(color));
     }
     line_problems_ui(loaded, ui);
     findings_ui(&loaded.health, ui);
@@ -54,8 +54,8 @@ pub(crate) fn findings_ui<'a>(findings: impl IntoIterator<Item = &'a HealthFindi
             }
             let text = RichText::new(&finding.problem).small();
             ui.label(if finding.severity == Severity::Info { text } else { text.color(color) });
-            if !finding.mend.is_empty() {
-                ui.label(RichText::new(format!("→ {}", finding.mend)).small().weak());
+            if !finding.remedy.is_empty() {
+                ui.label(RichText::new(format!("→ {}", finding.remedy)).small().weak());
             }
         });
     }
@@ -69,7 +69,7 @@ fn line_problems_ui(loaded: &LoadedLog, ui: &mut Ui) {
     }
     let many = |count: usize| if count == 1 { "" } else { "s" };
     let (rows, problems) = (log.dropped_rows, log.problem_count);
-    let count = format!("{rows} row{} left out, {problems} problem{} in lines", many(rows), many(problems));
+    let count = format!("{rows} row{} skipped, {problems} problem{} in lines", many(rows), many(problems));
     warning_ui(ui, count);
     for problem in log.problems.iter().take(SHOWN_PROBLEMS) {
         ui.label(RichText::new(problem.to_string()).small().weak());

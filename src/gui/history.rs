@@ -6,7 +6,7 @@ use crate::plot::{CHUNK, TimeColumn, ValueColumn};
 
 /// Samples that plots can reach, two hours at 1 kHz: about 0.7 GB with the pyramids.
 pub(crate) const HISTORY_SAMPLES: usize = 7_200_000;
-/// The same as a duration, s.
+/// Duration, s.
 pub(crate) const HISTORY_S: f64 = 7200.0;
 
 /// The recorded quantities, in the order of [`Sample::COLUMNS`].

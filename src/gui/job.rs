@@ -32,7 +32,7 @@ impl<P> Reports<P> {
     }
 }
 
-/// What a job reports through.
+/// Reports of a job.
 pub(crate) struct Reporter<P> {
     started: Instant,
     /// When progress may wake the window next, ms after the start.
@@ -43,7 +43,7 @@ pub(crate) struct Reporter<P> {
 }
 
 impl<P> Reporter<P> {
-    /// Whether the window no longer wants the result.
+    /// Returns whether the window no longer wants the result.
     pub(crate) fn is_cancelled(&self) -> bool {
         self.cancel.load(Ordering::Relaxed)
     }
@@ -63,7 +63,7 @@ impl<P> Reporter<P> {
     }
 }
 
-/// How a job ended.
+/// Outcome of a job.
 #[derive(Debug)]
 pub(crate) enum Outcome<R> {
     /// Still at work.
@@ -109,7 +109,7 @@ impl<P: Send + 'static, R: Send + 'static> Job<P, R> {
         Ok(Self { reports: Reports(reports), result, cancel })
     }
 
-    /// What has come since the last call: of many reports the first and always the last.
+    /// Reports since the last call: of many reports the first and always the last.
     pub(crate) fn poll(&mut self) -> (Vec<P>, Outcome<R>) {
         let outcome = match self.result.try_recv() {
             Ok(result) => Outcome::Done(result),

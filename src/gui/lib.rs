@@ -22,6 +22,7 @@ mod experiments;
 mod frames;
 mod friction;
 mod health_card;
+mod help;
 mod history;
 mod job;
 mod layout;

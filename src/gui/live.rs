@@ -8,9 +8,8 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync
 use std::time::{Duration, Instant};
 
 use flqr_core::control::BalanceController;
-use flqr_core::model_file::RobotModel;
+use flqr_core::model::{RobotModel, State};
 use flqr_core::record::Sample;
-use flqr_core::robot::State;
 use flqr_core::simulate::{Simulation, SimulationSettings, TICK_S};
 
 use crate::job::Waker;
@@ -21,7 +20,7 @@ const CATCH_UP_STEPS: u64 = 400;
 const BATCH_CAPACITY: usize = 64;
 const COMMAND_CAPACITY: usize = 64;
 
-/// What the window asks of the running robot.
+/// Commands to the running simulation.
 #[derive(Clone, Debug)]
 pub(crate) enum LiveCommand {
     /// New gains or feedforward, from the next step on.
@@ -52,7 +51,7 @@ pub(crate) struct Batch {
     pub(crate) problem: Option<String>,
 }
 
-/// What the window shows about the running robot.
+/// State of the running simulation.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct LiveStatus {
     pub(crate) paused: bool,
@@ -126,7 +125,7 @@ impl Live {
     }
 }
 
-/// How many steps are due.
+/// Number of steps due.
 struct Clock {
     anchor: Instant,
     done: u64,

@@ -19,7 +19,7 @@ use crate::widgets::shown;
 pub(crate) struct LoadedLog {
     pub(crate) log: Arc<Log>,
     pub(crate) path: PathBuf,
-    /// What it records, or why nothing in it can be fitted.
+    /// Kind of log, or the reason why it cannot be fitted.
     pub(crate) kind: Result<LogKind, String>,
     pub(crate) health: Vec<HealthFinding>,
     /// Horizontal axis of the preview: time where it is usable, else row numbers.
@@ -41,7 +41,7 @@ pub(crate) struct Axis {
     pub(crate) gap: f64,
 }
 
-/// How far loading has come.
+/// Progress of loading.
 #[derive(Clone, Copy)]
 pub(crate) struct LoadProgress {
     pub(crate) bytes: u64,
@@ -60,7 +60,7 @@ pub(crate) struct Loader {
     log: Option<Box<LoadedLog>>,
     generation: u64,
     started: Option<Instant>,
-    /// How long the last log took.
+    /// Loading time of the last log.
     took: Option<Duration>,
 }
 
@@ -82,7 +82,7 @@ impl Loader {
         self.generation += 1;
         let (path, generation) = (path.to_owned(), self.generation);
         let job = Job::start("load-log", waker, move |reporter| load(&path, &map, generation, reporter))
-            .map_err(|error| format!("No thread to load the log: {error}."))?;
+            .map_err(|error| format!("Cannot start loading the log: {error}."))?;
         self.job = Some(job);
         self.started = Some(Instant::now());
         self.progress = None;
@@ -104,7 +104,7 @@ impl Loader {
         let result = match outcome {
             Outcome::Running => return None,
             Outcome::Done(result) => result,
-            Outcome::Broken => Err("Loading failed: this is a defect of flqr.".to_owned()),
+            Outcome::Broken => Err("Loading failed: this is an internal error.".to_owned()),
         };
         self.job = None;
         self.took = self.started.map(|started| started.elapsed());
@@ -159,13 +159,13 @@ pub(crate) fn load(
         read_log(reader, &source, &ReadOptions::new(map), &mut watch).map_err(|error| error.to_string())?;
     if let Some(why) = no_log(&log) {
         return Err(format!(
-            "{source} is no log: {why}; choose a CSV file with a row of names and rows of numbers"
+            "{source} is not a log: {why}; choose a CSV file with a header line and rows of numbers"
         ));
     }
     Ok(Box::new(LoadedLog::new(log, path, generation)))
 }
 
-/// Why a file is no log but some other text. A table of unknown columns is one: a column map can name them.
+/// Reason why a file is not a log. A table of unknown columns is one: a column map can name them.
 fn no_log(log: &Log) -> Option<String> {
     let Err(missing) = log.kind() else { return None };
     let (rows, dropped) = (log.rows(), log.dropped_rows);
@@ -175,7 +175,7 @@ fn no_log(log: &Log) -> Option<String> {
     match () {
         () if rows == 0 => Some("it has no row of numbers".to_owned()),
         () if dropped > rows => {
-            Some(format!("{dropped} of its {} lines are no rows of numbers", rows + dropped))
+            Some(format!("{dropped} of its {} lines are not rows of numbers", rows + dropped))
         }
         () if 2 * numbers < count => Some(format!("{numbers} of its {count} cells are numbers")),
         () if log.columns.len() < 2 => Some(missing.to_string()),
@@ -211,7 +211,7 @@ impl LoadedLog {
         }
         let findings = if count == 1 { "finding" } else { "findings" };
         let text =
-            format!("{rows} rows loaded with {count} health {findings}: see {place}. They are from {path}.");
+            format!("{rows} rows loaded from {path} with {count} data-health {findings}, see {place}.");
         (Severity::Warning, text)
     }
 

@@ -5,16 +5,16 @@ use std::ops::RangeInclusive;
 use egui::accesskit::Action;
 use egui::{EventFilter, Key, Rect, Response, Sense, Stroke, Ui, Vec2, WidgetInfo, pos2, vec2};
 
-/// What a point of a drag or a press of an arrow key makes of the value, as a natural logarithm.
+/// Change of the natural logarithm of the value per point of a drag or key press.
 const USUAL: f64 = 0.015;
-/// The same with Shift held.
+/// Change with Shift held.
 const FINE: f64 = 0.0015;
 const RAIL: f32 = 6.0;
 const HANDLE: f32 = 6.5;
 
-/// What a tip says of it.
+/// Tooltip.
 pub(crate) const HELP: &str =
-    "Drag, or ← and →: 1.5 % a point or press, with Shift 0.15 %. A drag may leave the slider.";
+    "Drag, or ← and →: 1.5 % per point or key press, 0.15 % with Shift. The drag may leave the slider.";
 
 /// Draws it; `range` is what the rail shows, and what a drag stays in unless the value lies beyond.
 pub(crate) fn log_slider_ui(
@@ -44,7 +44,7 @@ pub(crate) fn log_slider_ui(
     response
 }
 
-/// How far the user moves it, as a natural logarithm.
+/// Change by the user, as a natural logarithm.
 fn steps(ui: &Ui, response: &Response) -> f64 {
     let mut way = response.drag_delta();
     if response.drag_started() {
@@ -67,8 +67,8 @@ fn steps(ui: &Ui, response: &Response) -> f64 {
     points * if ui.input(|input| input.modifiers.shift) { FINE } else { USUAL }
 }
 
-/// `value` times e to the power of `by`, with digits that a person would type. From 0, which no factor leaves, it goes to
-/// the smallest.
+/// `value` times e to the power of `by`, with digits that a person would type. From 0, which no factor leaves, it
+/// goes to the smallest.
 fn moved(value: f64, by: f64, range: &RangeInclusive<f64>) -> f64 {
     match () {
         () if by == 0.0 => value,
@@ -85,7 +85,7 @@ pub(crate) fn rounded(value: f64) -> f64 {
     format!("{value:.4e}").parse().unwrap_or(value)
 }
 
-/// Where on the rail a value is, from 0 to 1.
+/// Position of a value on the rail, from 0 to 1.
 fn share(value: f64, range: &RangeInclusive<f64>) -> f32 {
     let [low, high] = [range.start(), range.end()].map(|end| end.ln());
     if value > 0.0 { ((value.ln() - low) / (high - low)).clamp(0.0, 1.0) as f32 } else { 0.0 }

@@ -1,4 +1,4 @@
-//! Every message since the start: the newest is in the status line, all are on the *Log* page.
+//! All messages since the start: the newest is in the status line, all are on the *Log* page.
 
 use std::cell::Cell;
 use std::collections::VecDeque;
@@ -45,7 +45,7 @@ impl Severity {
     }
 }
 
-/// What is to be said, and how.
+/// Message and severity.
 pub(crate) type Said = (Severity, String);
 
 /// One message, and how often it came in a row.
@@ -68,7 +68,7 @@ impl Message {
         }
     }
 
-    /// How high it is in `width`; laid out only once for it.
+    /// Height at `width`; computed once.
     fn height(&self, ui: &Ui, width: f32) -> f32 {
         if let Some((known, height)) = self.laid_out.get()
             && known == width
@@ -91,7 +91,7 @@ impl Message {
 pub(crate) struct Messages {
     start: Instant,
     all: VecDeque<Message>,
-    /// What the status line says until the user does something, whatever is said meanwhile.
+    /// Message that stays in the status line until the next user input.
     standing: Option<String>,
     filter: String,
     only_errors: bool,
@@ -139,7 +139,7 @@ impl Messages {
         self.standing = None;
     }
 
-    /// What the status line says.
+    /// Text of the status line.
     pub(crate) fn status(&self) -> Option<(Severity, &str)> {
         let newest = || self.all.back().map(|message| (message.severity, &*message.text));
         self.standing.as_deref().map(|text| (Severity::Warning, text)).or_else(newest)
@@ -167,16 +167,16 @@ impl Messages {
     fn controls_ui(&mut self, ui: &mut Ui) {
         ui.horizontal_wrapped(|ui| {
             let filter = TextEdit::singleline(&mut self.filter).hint_text("filter").desired_width(180.0);
-            ui.add(filter).accessible_name("message filter").on_hover_text("Messages with these letters");
+            ui.add(filter).accessible_name("message filter").on_hover_text("Filter messages");
             ui.checkbox(&mut self.only_errors, "Errors only").on_hover_text("And warnings");
             let shown = self.shown();
             let copy = ui.add_enabled(!shown.is_empty(), egui::Button::new("Copy messages"));
-            if copy.on_hover_text("Copy what is shown, as text").clicked() {
+            if copy.on_hover_text("Copy the shown messages as text").clicked() {
                 let lines: Vec<_> = shown.iter().map(|message| message.line()).collect();
                 ui.ctx().copy_text(lines.join("\n"));
             }
             hint_ui(ui, format!("{} of {} messages", shown.len(), self.all.len()));
-            if ui.button("Clear").on_hover_text("Forget all messages").clicked() {
+            if ui.button("Clear").on_hover_text("Clear all messages").clicked() {
                 self.all.clear();
             }
         });

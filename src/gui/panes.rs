@@ -1,4 +1,4 @@
-//! The panes of a page: beside each other where there is room, some of them behind their names where there is not.
+//! The panes of a page: next to each other where there is room, some of them behind their names where there is not.
 
 use std::ops::RangeInclusive;
 
@@ -7,7 +7,7 @@ use egui::{CentralPanel, Frame, Id, Margin, Panel, ScrollArea, Ui};
 /// Space at the left and right of a pane's content, in points.
 pub(crate) const MARGIN: f32 = 10.0;
 
-/// What fills what the others leave is at least this high unless it says more: a lower page scrolls.
+/// Fills the remaining space is at least this high unless it says more: a lower page scrolls.
 const LEAST_HEIGHT: f32 = 420.0;
 
 /// One pane; `key` is what the page calls it.
@@ -33,7 +33,7 @@ impl<K> Pane<K> {
         Self::new(key, name, Place::Left(widths), width)
     }
 
-    /// What is left between the others, and at least `width`.
+    /// Remaining width between the others, at least `width`.
     pub(crate) fn middle(key: K, name: &'static str, width: f32) -> Self {
         Self::new(key, name, Place::Middle, width)
     }
@@ -90,7 +90,7 @@ pub(crate) fn panes_ui<K: Copy>(
             let names = |ui: &mut Ui| {
                 let clicked = |(pane, shown): (&Pane<K>, &bool)| {
                     let name = ui.selectable_label(*shown, pane.name);
-                    name.on_hover_text("There is no room for all panes of this page").clicked()
+                    name.on_hover_text("The window is too small for all panes of this page").clicked()
                 };
                 // All of them are drawn before one is chosen.
                 let clicks: Vec<bool> = panes.iter().zip(&shown).map(clicked).collect();

@@ -4,13 +4,12 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
-use eframe::icon_data::IconDataExt;
-use egui::{ColorImage, Context, IconData, Rect};
+use egui::{ColorImage, Context, Rect};
 
 /// A window system that has not brought a picture after this time never will.
 const LONGEST_WAIT: Duration = Duration::from_secs(5);
 
-/// A picture that was asked for.
+/// A picture that was requested.
 pub(crate) struct Shot {
     asked: Instant,
     image: Receiver<Arc<ColorImage>>,
@@ -40,7 +39,7 @@ impl Shot {
                 Some(Ok(Picture { image, part: self.part, pixels_per_point: self.pixels_per_point }))
             }
             Err(_) if self.asked.elapsed() > LONGEST_WAIT => {
-                Some(Err("The window system brought no picture of the page.".to_owned()))
+                Some(Err("The window system did not return a picture of the page.".to_owned()))
             }
             Err(_) => None,
         }
@@ -65,34 +64,29 @@ impl Picture {
         } else {
             image.region_by_pixels([0, 0], image.size)
         };
-        let rgba = part.pixels.iter().flat_map(egui::Color32::to_srgba_unmultiplied).collect();
-        let picture = IconData { rgba, width: part.width() as u32, height: part.height() as u32 };
-        let png = picture.to_png_bytes();
-        let png = png.map_err(|error| format!("the picture could not be encoded: {error}"))?;
-        Ok(if sources.is_empty() { png } else { with_text(png, &sources.join("\n")) })
+        let rgba: Vec<u8> = part.pixels.iter().flat_map(egui::Color32::to_srgba_unmultiplied).collect();
+        encoded(&rgba, part.size, sources)
+            .map_err(|error| format!("the picture could not be encoded: {error}"))
     }
 }
 
-/// Bytes before the second chunk of a PNG: its signature and the header.
-const PNG_HEAD: usize = 8 + 25;
-
-/// The same picture with a text chunk of the keyword Source.
-fn with_text(mut png: Vec<u8>, text: &str) -> Vec<u8> {
-    let mut chunk = b"iTXtSource\0\0\0\0\0".to_vec();
-    chunk.extend_from_slice(text.as_bytes());
-    let length = (chunk.len() - 4) as u32;
-    let check = crc32(&chunk);
-    chunk.splice(..0, length.to_be_bytes());
-    chunk.extend(check.to_be_bytes());
-    png.splice(PNG_HEAD..PNG_HEAD, chunk);
-    png
-}
-
-/// The cyclic redundancy check of PNG: CRC-32 of ISO 3309.
-fn crc32(bytes: &[u8]) -> u32 {
-    let of_bit = |rest: u32| if rest & 1 == 1 { 0xedb8_8320 ^ (rest >> 1) } else { rest >> 1 };
-    let of_byte = |rest: u32, byte: &u8| (0..8).fold(rest ^ u32::from(*byte), |rest, _| of_bit(rest));
-    !bytes.iter().fold(u32::MAX, of_byte)
+/// A PNG with a text chunk of the keyword Source.
+fn encoded(
+    rgba: &[u8],
+    [width, height]: [usize; 2],
+    sources: &[String],
+) -> Result<Vec<u8>, png::EncodingError> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, width as u32, height as u32);
+    encoder.set_color(png::ColorType::Rgba);
+    encoder.set_depth(png::BitDepth::Eight);
+    if !sources.is_empty() {
+        encoder.add_itxt_chunk("Source".to_owned(), sources.join("\n"))?;
+    }
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(rgba)?;
+    writer.finish()?;
+    Ok(bytes)
 }
 
 #[cfg(test)]
@@ -117,8 +111,6 @@ mod tests {
 
     #[test]
     fn a_picture_says_where_it_comes_from_and_is_still_a_picture() {
-        // The check value of the polynomial's catalogue, and that of the chunk that ends every PNG.
-        assert_eq!((crc32(b"123456789"), crc32(b"IEND")), (0xcbf4_3926, 0xae42_6082));
         let image = Arc::new(ColorImage::new([2, 1], vec![Color32::RED, Color32::BLUE]));
         let picture = Picture { image, part: Rect::EVERYTHING, pixels_per_point: 1.0 };
         let png = picture.png(&["run 3: flat, x²".to_owned()]).unwrap();

@@ -1,4 +1,4 @@
-//! How quantities are named, scaled and shown.
+//! Names, scales and formats of quantities.
 
 use flqr_core::effects::name_and_unit;
 use flqr_core::report::number::fixed;
@@ -12,7 +12,7 @@ pub(crate) const STATES: [&str; 4] = ["displacement", "velocity", "pitch", "pitc
 /// Names of its motors, as above.
 pub(crate) const MOTORS: [&str; 2] = ["left", "right"];
 
-/// How a quantity is shown.
+/// Format of a quantity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Quantity {
     pub(crate) name: &'static str,

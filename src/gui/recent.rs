@@ -33,7 +33,7 @@ pub(crate) struct Recent {
     pub(crate) imu: [String; 2],
     /// Session files.
     pub(crate) sessions: Vec<PathBuf>,
-    /// Whether the tour was seen or skipped.
+    /// True if the tour was seen or skipped.
     pub(crate) tour_done: bool,
 }
 
@@ -78,7 +78,7 @@ fn note(list: &mut Vec<PathBuf>, path: &Path) {
     list.truncate(LONGEST_LIST);
 }
 
-/// Where the list is usually kept; none where the system names no folder for it.
+/// Default path of the list; `None` if the system defines no folder.
 pub(crate) fn default_file() -> Option<PathBuf> {
     let folder = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
     let config = if cfg!(windows) {

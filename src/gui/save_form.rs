@@ -9,7 +9,7 @@ use crate::picture::Shot;
 use crate::widgets::{choice_ui, error_ui, section_ui, warning_ui};
 use crate::write_file::{Files, Share, Written, bytes, write_files};
 
-/// What a page can save.
+/// Formats that a page can save.
 pub(crate) trait FileKind: Copy + Default + PartialEq + 'static {
     /// All of them, with their names and what the files hold.
     const ALL: &'static [(Self, &'static str, &'static str)];
@@ -18,7 +18,7 @@ pub(crate) trait FileKind: Copy + Default + PartialEq + 'static {
     fn extension(self) -> &'static str;
 }
 
-/// What a path's ending says is saved.
+/// Format given by a file extension.
 fn known_ending<K: FileKind>(path: &Path) -> Option<K> {
     let ending = path.extension()?.to_string_lossy().to_lowercase();
     K::ALL.iter().map(|(kind, ..)| *kind).find(|kind| kind.extension() == ending)
@@ -35,36 +35,36 @@ pub(crate) fn with_ending<K: FileKind>(path: PathBuf, kind: K) -> PathBuf {
     name.into()
 }
 
-/// What is saved, where to, and whether it may replace what is there.
+/// Format, path and permission to overwrite.
 pub(crate) type Target<K> = (K, PathBuf, bool);
 
-/// What is being written.
+/// Running write.
 struct Writing<K> {
     kind: K,
     path: PathBuf,
-    /// What has to be said of it.
+    /// Message about it.
     remark: Option<String>,
     share: Share,
     job: Job<Share, Result<Written, String>>,
 }
 
-/// A picture of the window that was asked for.
+/// A picture of the window that was requested.
 struct Awaited<K> {
     target: Target<K>,
-    /// What the picture says of itself.
+    /// Metadata of the picture.
     sources: Vec<String>,
     shot: Shot,
     waker: Waker,
 }
 
-/// What was asked for and would replace files.
+/// Requested files that would be overwritten.
 struct Overwrite<K> {
     kind: K,
     path: PathBuf,
     existing: Vec<PathBuf>,
 }
 
-/// How a page speaks of its form.
+/// Labels of a form.
 pub(crate) struct Words<K> {
     /// Name of the path's field, and its help.
     pub(crate) path: [&'static str; 2],
@@ -72,7 +72,7 @@ pub(crate) struct Words<K> {
     pub(crate) save: fn(K) -> &'static str,
 }
 
-/// How a form is laid out.
+/// Layout of a form.
 pub(crate) enum Layout {
     /// In a column of a page, below a heading.
     Column,
@@ -80,8 +80,8 @@ pub(crate) enum Layout {
     Row(&'static str),
 }
 
-/// What the form asks for.
-pub(crate) struct Asked<K> {
+/// Requests of the form.
+pub(crate) struct FormRequest<K> {
     pub(crate) save: Option<Target<K>>,
     /// Ask for a path with a dialog.
     pub(crate) dialog: Option<K>,
@@ -97,7 +97,7 @@ pub(crate) struct SaveForm<K> {
     awaited: Option<Awaited<K>>,
     writing: Option<Writing<K>>,
     overwrite: Option<Overwrite<K>>,
-    /// What was written last, and where to.
+    /// Last written format and path.
     written: Option<(K, PathBuf)>,
 }
 
@@ -106,7 +106,7 @@ impl<K: FileKind> SaveForm<K> {
         self.awaited.is_some() || self.writing.is_some()
     }
 
-    /// What has been written since this was asked last.
+    /// Files written since the last call.
     pub(crate) fn take_written(&mut self) -> Option<(K, PathBuf)> {
         self.written.take()
     }
@@ -130,15 +130,15 @@ impl<K: FileKind> SaveForm<K> {
         waker: &Waker,
     ) -> Result<(), String> {
         if self.is_busy() {
-            return Err("A file is still being written: try again when that has ended.".to_owned());
+            return Err("A file is still being written. Try again when it is finished.".to_owned());
         }
         let (kind, path, replace) = target;
-        let asked = path.clone();
+        let request = path.clone();
         let work = move |reporter: &Reporter<Share>| {
-            write_files(files(&asked)?, replace, &mut |share| reporter.progress(share))
+            write_files(files(&request)?, replace, &mut |share| reporter.progress(share))
         };
         let job = Job::start("save", waker, work)
-            .map_err(|error| format!("No thread to write the file: {error}."))?;
+            .map_err(|error| format!("Cannot start writing the file: {error}."))?;
         self.writing = Some(Writing { kind, path, remark, share: 0.0, job });
         Ok(())
     }
@@ -152,7 +152,7 @@ impl<K: FileKind> SaveForm<K> {
         waker: &Waker,
     ) -> Result<(), String> {
         if self.is_busy() {
-            return Err("A file is still being written: try again when that has ended.".to_owned());
+            return Err("A file is still being written. Try again when it is finished.".to_owned());
         }
         self.awaited = Some(Awaited { target, sources, shot, waker: Waker::clone(waker) });
         Ok(())
@@ -184,7 +184,7 @@ impl<K: FileKind> SaveForm<K> {
         let result = match outcome {
             Outcome::Running => return None,
             Outcome::Done(result) => result,
-            Outcome::Broken => Err("Writing the file failed: this is a defect of flqr.".to_owned()),
+            Outcome::Broken => Err("Writing the file failed: this is an internal error.".to_owned()),
         };
         let Writing { kind, path, remark, .. } = self.writing.take()?;
         Some(result.map(|written| match written {
@@ -195,7 +195,7 @@ impl<K: FileKind> SaveForm<K> {
             }
             Written::NoneAsThereAre(existing) => {
                 let verbs = if existing.len() == 1 { "exists and was" } else { "exist and were" };
-                let message = format!("{} {verbs} not replaced.", listed(&existing));
+                let message = format!("{} {verbs} not overwritten.", listed(&existing));
                 self.overwrite = Some(Overwrite { kind, path, existing });
                 message
             }
@@ -210,14 +210,14 @@ impl<K: FileKind> SaveForm<K> {
         layout: Layout,
         more: impl FnOnce(&mut Ui, K),
         ui: &mut Ui,
-    ) -> Asked<K> {
-        let mut asked = Asked { save: None, dialog: None };
+    ) -> FormRequest<K> {
+        let mut request = FormRequest { save: None, dialog: None };
         match layout {
             Layout::Column => {
                 section_ui(ui, "Save", |_| {});
                 ui.horizontal_wrapped(|ui| self.kind_ui(ui));
                 let entered = self.path_ui(words, f32::INFINITY, ui);
-                ui.horizontal_wrapped(|ui| self.buttons_ui(words, entered, &mut asked, ui));
+                ui.horizontal_wrapped(|ui| self.buttons_ui(words, entered, &mut request, ui));
                 more(ui, self.kind);
             }
             Layout::Row(title) => {
@@ -225,7 +225,7 @@ impl<K: FileKind> SaveForm<K> {
                     ui.label(title);
                     ui.scope(|ui| self.kind_ui(ui));
                     let entered = self.path_ui(words, 220.0, ui);
-                    self.buttons_ui(words, entered, &mut asked, ui);
+                    self.buttons_ui(words, entered, &mut request, ui);
                     more(ui, self.kind);
                 });
             }
@@ -234,8 +234,8 @@ impl<K: FileKind> SaveForm<K> {
         if let Some(problem) = &self.problem {
             error_ui(ui, problem);
         }
-        self.overwrite_ui(&mut asked, ui);
-        asked
+        self.overwrite_ui(&mut request, ui);
+        request
     }
 
     fn kind_ui(&mut self, ui: &mut Ui) {
@@ -249,15 +249,15 @@ impl<K: FileKind> SaveForm<K> {
         }
     }
 
-    fn buttons_ui(&mut self, words: &Words<K>, entered: bool, asked: &mut Asked<K>, ui: &mut Ui) {
+    fn buttons_ui(&mut self, words: &Words<K>, entered: bool, request: &mut FormRequest<K>, ui: &mut Ui) {
         let ready = !self.path.trim().is_empty() && !self.is_busy();
         let save = ui.add_enabled(ready, Button::new((words.save)(self.kind)));
-        let save = save.on_hover_text("An existing file is replaced only after a question");
+        let save = save.on_hover_text("You are asked before an existing file is overwritten");
         if save.clicked() || (entered && ready) {
-            asked.save = Some((self.kind, PathBuf::from(self.path.trim()), false));
+            request.save = Some((self.kind, PathBuf::from(self.path.trim()), false));
         }
         if ui.button("Choose…").on_hover_text("Choose where to save").clicked() {
-            asked.dialog = Some(self.kind);
+            request.dialog = Some(self.kind);
         }
     }
 
@@ -265,10 +265,7 @@ impl<K: FileKind> SaveForm<K> {
     fn progress_ui(&self, ui: &mut Ui) {
         let Some(writing) = self.writing.as_ref().filter(|writing| writing.share > 0.0) else { return };
         ui.horizontal(|ui| {
-            if ui
-                .button("Cancel saving")
-                .on_hover_text("Stop writing; the file that is begun is not kept")
-                .clicked()
+            if ui.button("Cancel saving").on_hover_text("Stop writing; the partial file is deleted").clicked()
             {
                 writing.job.cancel();
             }
@@ -277,7 +274,7 @@ impl<K: FileKind> SaveForm<K> {
         });
     }
 
-    /// Whether a path was entered.
+    /// Returns whether a path was entered.
     fn path_ui(&mut self, words: &Words<K>, width: f32, ui: &mut Ui) -> bool {
         let [name, help] = words.path;
         let field = TextEdit::singleline(&mut self.path)
@@ -297,15 +294,15 @@ impl<K: FileKind> SaveForm<K> {
         entered
     }
 
-    fn overwrite_ui(&mut self, asked: &mut Asked<K>, ui: &mut Ui) {
+    fn overwrite_ui(&mut self, request: &mut FormRequest<K>, ui: &mut Ui) {
         let Some(Overwrite { kind, path, existing }) = self.overwrite.take() else { return };
         warning_ui(ui, format!("Replace {}?", listed(&existing)));
         let answer = ui.horizontal(|ui| {
-            let replace = ui.button("Replace").on_hover_text("Replace what is there");
-            (replace.clicked(), ui.button("Keep").on_hover_text("Leave what is there").clicked())
+            let replace = ui.button("Replace").on_hover_text("Overwrite");
+            (replace.clicked(), ui.button("Keep").on_hover_text("Do not overwrite").clicked())
         });
         match answer.inner {
-            (true, _) => asked.save = Some((kind, path, true)),
+            (true, _) => request.save = Some((kind, path, true)),
             (_, true) => {}
             _ => self.overwrite = Some(Overwrite { kind, path, existing }),
         }

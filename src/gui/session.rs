@@ -4,8 +4,8 @@ use std::sync::LazyLock;
 
 use flqr_core::control::{BalanceController, ControlError, ControllerKind, DEFAULT_COMPENSATION};
 use flqr_core::friction::{Compensation, Stribeck};
-use flqr_core::lqr::Weights;
-use flqr_core::model_file::{AxisParameters, Model, Rig, RobotModel, Tolerances, presets};
+use flqr_core::model::{AxisParameters, Model, Rig, RobotModel, Tolerances, Weights};
+use flqr_core::model_file::presets;
 use nalgebra::Matrix2x4;
 
 /// Weights of a robot whose file has none: those of the paper's preset, without the entry off Q's diagonal, which
@@ -16,16 +16,16 @@ static FILLED_IN: LazyLock<Weights> = LazyLock::new(|| {
     Weights::diagonal(weights.q.diagonal().into(), weights.r.diagonal().into())
 });
 
-/// What the user edits.
+/// Edited document.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Session {
     /// Name of the model.
     pub(crate) name: String,
     /// Robot or axis, as in the file and as edited; what is filled in for use is not here, so it is not saved.
     pub(crate) rig: Rig,
-    /// How well the model's numbers are known.
+    /// Tolerances of the model's parameters.
     pub(crate) tolerance: Tolerances,
-    /// Whether friction is fed forward.
+    /// True if friction is fed forward.
     pub(crate) controller: ControllerKind,
 }
 
@@ -35,7 +35,7 @@ impl Session {
         Self { name: model.name, rig: model.rig, tolerance: model.tolerance, controller }
     }
 
-    /// What is used although the model has it not, as a sentence.
+    /// Describes the defaults used for missing parts of the model.
     pub(crate) fn filled_in(&self) -> Option<String> {
         let robot = self.robot()?;
         let weights = "the weights of the paper's preset";
@@ -47,7 +47,7 @@ impl Session {
             (Some(_), None) => ("[compensation]", format!("{usual} fills in")),
             (None, None) => ("[lqr] and no [compensation]", format!("{weights} and {usual} fill in")),
         };
-        Some(format!("It has no {tables}: {used}, and nothing of that is saved unedited."))
+        Some(format!("It has no {tables}: {used}. They are saved only if edited."))
     }
 
     /// The model as it would be saved.
@@ -118,7 +118,7 @@ impl Session {
             .ok()
     }
 
-    /// Why FLQR would do nothing more than LQR, if it would.
+    /// Reason why FLQR equals LQR, if it does.
     pub(crate) fn feedforward_problem(&self) -> Option<&'static str> {
         let robot = self.robot()?;
         let has_friction = robot.friction.iter().any(Option::is_some);
@@ -128,14 +128,14 @@ impl Session {
             matches!(flqr, Err(ControlError::NoFriction))
         };
         (!has_friction && is_lqr()).then_some(
-            "The model has no friction, so FLQR equals LQR: fit a log on the friction tab, or tick a motor under “Friction of the motors”.",
+            "The model has no friction, so FLQR equals LQR. Fit a log on the Friction tab, or enable a motor under “Friction of the motors”.",
         )
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use flqr_core::effects::{Effect, MachineKind};
+    use flqr_core::model::{Effect, MachineKind};
 
     use super::*;
 

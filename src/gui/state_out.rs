@@ -31,7 +31,7 @@ impl StateOut {
         Ok(Self { sender, last: Value::Null, last_time: None })
     }
 
-    /// Whether a snapshot would be taken now, or how long until then.
+    /// Returns whether a snapshot would be taken now, or how long until then.
     pub(crate) fn wait(&self) -> Option<Duration> {
         let elapsed = self.last_time?.elapsed();
         INTERVAL.checked_sub(elapsed)

@@ -8,7 +8,7 @@ pub enum Tab {
     Tune,
     /// Friction from a measured log.
     Friction,
-    /// What the model lacks, from measured logs.
+    /// Effects that the model lacks, from measured logs.
     Refine,
     /// The paper's experiments on the simulated robot.
     Experiments,
@@ -16,7 +16,7 @@ pub enum Tab {
     Robot,
     /// The ledger of all runs.
     Runs,
-    /// Every message since the start.
+    /// All messages since the start.
     Log,
 }
 
@@ -38,16 +38,16 @@ impl Tab {
         }
     }
 
-    /// What is on it.
+    /// Describes the page.
     pub fn help(self) -> &'static str {
         match self {
             Self::Tune => "Weights, gains and the live robot",
             Self::Friction => "Friction from a measured log",
-            Self::Refine => "What the model lacks, from measured logs",
-            Self::Experiments => "LQR and FLQR side by side on the simulated robot",
+            Self::Refine => "Effects that the model lacks, from measured logs",
+            Self::Experiments => "LQR and FLQR side by side in simulation",
             Self::Robot => "Connection, health, arming and recording of a robot",
-            Self::Runs => "All runs so far: over each other, and what changed between them",
-            Self::Log => "Every message since the start",
+            Self::Runs => "All runs: overlay and comparison",
+            Self::Log => "All messages since the start",
         }
     }
 

@@ -8,9 +8,9 @@ use egui::{
 /// Colours with a meaning.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Palette {
-    /// What is in force: new gains, the fitted curve.
+    /// Active values: new gains, the fitted curve.
     pub(crate) accent: Color32,
-    /// What it is compared with.
+    /// Reference.
     pub(crate) reference: Color32,
     /// Curves of displacement, velocity and pitch.
     pub(crate) channels: [Color32; 3],

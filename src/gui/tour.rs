@@ -9,32 +9,32 @@ use crate::tab::Tab;
 const STEPS: [(&str, &str, Tab); 5] = [
     (
         "The robot in the middle is simulated",
-        "Press “Push” above the plots: the controller catches it. Then drag the slider of the pitch weight at the left and push again; the gains follow while you drag. Ctrl+Z takes a drag back.",
+        "Press “Push” above the plots: the controller recovers. Then drag the slider of the pitch weight on the left and push again; the gains are updated while you drag. Ctrl+Z undoes it.",
         Tab::Tune,
     ),
     (
         "Both controllers side by side",
-        "Press the button that runs LQR and FLQR. The same robot stands twice, without and with friction compensation; the table says how much less it hunts. Space lets the time run.",
+        "Press the button that runs LQR and FLQR. The table compares the same robot without and with friction compensation. Space plays the run.",
         Tab::Experiments,
     ),
     (
         "Friction from a measurement",
-        "With a log of your motor: drop its CSV file here, or type its path (Ctrl+L), then “Start fit”. What was fitted goes into the model with one button.",
+        "Drop the CSV log of your motor here, or type its path (Ctrl+L), then press “Start fit”. One button uses the result in the model.",
         Tab::Friction,
     ),
     (
-        "A robot, or one that speaks like it",
-        "Choose “emulated” as the source at the top and press Connect: the real bytes, without hardware. Nothing is sent before it is armed in two steps; Esc and Space always stop it.",
+        "A real or an emulated robot",
+        "Choose “emulated” as the source at the top and press Connect to use the real protocols without hardware. Nothing is sent before it is armed in two steps; Esc and Space always stop it.",
         Tab::Robot,
     ),
     (
-        "Everything by name",
-        "Ctrl+K finds any command, also the way to put pages beside each other. The session is kept by itself; “Save the model” writes it to a file of your own.",
+        "All commands by name",
+        "Ctrl+K finds any command, for example to arrange pages side by side. The session is saved automatically; “Save the model” writes the model to a file.",
         Tab::Tune,
     ),
 ];
 
-/// Where the tour stands.
+/// Step of the tour.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Tour {
     step: usize,
@@ -72,7 +72,7 @@ impl Tour {
                     if !last
                         && ui
                             .button("Skip the tour")
-                            .on_hover_text("“Tour” in the menu brings it back")
+                            .on_hover_text("“Tour” in the menu shows it again")
                             .clicked()
                     {
                         next = None;

@@ -26,7 +26,7 @@ pub(crate) fn hint_ui(ui: &mut Ui, text: impl Into<String>) -> Response {
     ui.add(egui::Label::new(RichText::new(text).small().weak()).wrap())
 }
 
-/// What a page without content says: what is missing, and how it comes; `more` adds to it.
+/// Text of an empty page: what is missing, and how it comes; `more` adds to it.
 pub(crate) fn empty_page_ui(ui: &mut Ui, missing: &str, hint: &str, more: impl FnOnce(&mut Ui)) {
     ui.add_space(0.3 * ui.available_height());
     ui.vertical_centered(|ui| {
@@ -68,8 +68,8 @@ pub(crate) fn number_ui(ui: &mut Ui, value: &mut f64, name: &str, width: f32) ->
     })
 }
 
-/// Adds a number field as `adapt` makes it. Only what is dragged, or typed and then confirmed or left, changes the value:
-/// entering and leaving it does not, and Esc discards what was typed.
+/// Adds a number field as `adapt` makes it. Only what is dragged, or typed and then confirmed or left, changes the
+/// value: entering and leaving it does not, and Esc discards what was typed.
 pub(crate) fn entry_ui<T: Numeric>(
     ui: &mut Ui,
     value: &mut T,
@@ -87,7 +87,7 @@ pub(crate) fn entry_ui<T: Numeric>(
     response
 }
 
-/// Whether a field was left with Esc just now: it takes over what was typed up to two passes after it is left.
+/// Returns whether a field was left with Esc just now: it takes over what was typed up to two passes after it is left.
 fn is_escaped(ui: &Ui, response: &Response) -> bool {
     let (now, key) = (ui.ctx().cumulative_pass_nr(), response.id.with("escaped"));
     if response.lost_focus() && escape_pressed(ui) {
@@ -97,7 +97,7 @@ fn is_escaped(ui: &Ui, response: &Response) -> bool {
     escaped.is_some_and(|pass| now - pass <= 2)
 }
 
-/// Whether Esc was pressed in this frame, even if the press was taken away to stop the robot.
+/// Returns whether Esc was pressed in this frame, even if the press was taken away to stop the robot.
 fn escape_pressed(ui: &Ui) -> bool {
     let is_escape = |event: &Event| matches!(event, Event::Key { key: Key::Escape, pressed: true, .. });
     ui.input(|input| input.raw.events.iter().any(is_escape))

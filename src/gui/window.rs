@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use flqr_core::device::{SerialAddress, Source};
-use flqr_core::model_file::Model;
+use flqr_core::model::Model;
 use flqr_core::record::Mapping;
 
 use crate::app::App;
@@ -12,12 +12,12 @@ use crate::memory::keep_freed_memory;
 use crate::robot::{Devices, System};
 use crate::tab::Tab;
 
-/// How the window starts.
+/// Start options of the window.
 #[derive(Clone, Debug)]
 pub struct WindowOptions {
     /// The model to begin with.
     pub model: Model,
-    /// Where the model came from; "Save" goes there.
+    /// Path of the model, used by "Save".
     pub model_path: Option<PathBuf>,
     /// A log to load at once.
     pub log: Option<PathBuf>,
@@ -29,21 +29,21 @@ pub struct WindowOptions {
     pub source: Option<Source>,
     /// The IMU of a robot on CAN.
     pub imu: Option<SerialAddress>,
-    /// What opens robots.
+    /// Opens robots.
     pub devices: Arc<dyn Devices>,
-    /// Whether the simulated robot starts paused.
+    /// True if the simulated robot starts paused.
     pub paused: bool,
     /// A file that always holds what the window shows, as JSON.
     pub state_out: Option<PathBuf>,
-    /// Where the list of recent files is kept; without one it is not kept.
+    /// Path of the list of recent files; without it, the list is not saved.
     pub recent_file: Option<PathBuf>,
     /// A session file to open.
     pub session: Option<PathBuf>,
     /// Folder where the running session is kept; without one it is not kept.
     pub state_folder: Option<PathBuf>,
-    /// What has to be said at the start.
+    /// Message at start.
     pub warning: Option<String>,
-    /// Whether the tour may begin, if it was never seen.
+    /// True if the tour may begin, if it was never seen.
     pub tour: bool,
 }
 
@@ -70,17 +70,17 @@ impl WindowOptions {
     }
 }
 
-/// Why there is no window.
+/// Reason why there is no window.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum WindowError {
     /// No display, or one without OpenGL.
     NoDisplay {
-        /// What the system said.
+        /// Message of the system.
         reason: String,
     },
     /// A library of the window system is missing.
     MissingLibrary {
-        /// What the system said.
+        /// Message of the system.
         reason: String,
     },
 }
@@ -90,11 +90,11 @@ impl std::fmt::Display for WindowError {
         match self {
             Self::NoDisplay { reason } => write!(
                 f,
-                "the window needs a display with OpenGL and there is none here ({reason}); without one, use `flqr gains`, `flqr fit`, `flqr simulate`, `flqr riccati` or `flqr export`"
+                "the window needs a display with OpenGL, which is not available ({reason}): without it, use `flqr gains`, `flqr fit`, `flqr simulate`, `flqr riccati` or `flqr export`"
             ),
             Self::MissingLibrary { reason } => write!(
                 f,
-                "the window could not be opened because a library is missing ({reason}); on Debian or Ubuntu install {PACKAGES}, or use `flqr gains`, `flqr fit`, `flqr simulate`, `flqr riccati` or `flqr export`, which need none"
+                "the window could not be opened because a library is missing ({reason}); on Debian or Ubuntu install {PACKAGES}, or use `flqr gains`, `flqr fit`, `flqr simulate`, `flqr riccati` or `flqr export`, which do not need it"
             ),
         }
     }
@@ -102,7 +102,7 @@ impl std::fmt::Display for WindowError {
 
 impl std::error::Error for WindowError {}
 
-/// What a bare Debian 12 needs at run time.
+/// Run-time packages for a minimal Debian 12.
 const PACKAGES: &str = "libx11-6 libx11-xcb1 libxcursor1 libxi6 libxkbcommon-x11-0 libgl1";
 
 const ICON: &[u8] = include_bytes!("../../assets/icon.png");

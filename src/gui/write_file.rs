@@ -12,7 +12,7 @@ pub(crate) fn write_file(path: &Path, content: &[u8]) -> io::Result<()> {
     write_file_with(path, |file| file.write_all(content))
 }
 
-/// The same of content that is made while it is written.
+/// Writes content that is generated while writing.
 pub(crate) fn write_file_with(
     path: &Path,
     write: impl FnOnce(&mut File) -> io::Result<()>,
@@ -23,7 +23,7 @@ pub(crate) fn write_file_with(
     replace_file(path, write)
 }
 
-/// How the writing of one file ended.
+/// Outcome of writing one file.
 #[derive(Debug)]
 pub(crate) enum Saved {
     Written,
@@ -34,7 +34,7 @@ pub(crate) enum Saved {
 /// Writes a file; an existing one is replaced only if `replace`. `text` is made only where it is written.
 ///
 /// # Errors
-/// A sentence that says what could not be written and the mend.
+/// A sentence that says what could not be written and the remedy.
 pub(crate) fn save_file(path: &Path, text: impl FnOnce() -> String, replace: bool) -> Result<Saved, String> {
     if !replace && path.symlink_metadata().is_ok() {
         return Ok(Saved::AnotherIsThere);
@@ -42,7 +42,7 @@ pub(crate) fn save_file(path: &Path, text: impl FnOnce() -> String, replace: boo
     write_file(path, text().as_bytes()).map(|()| Saved::Written).map_err(|error| not_saved(path, &error))
 }
 
-/// Share of what is written, from 0 to 1.
+/// Fraction of what is written, from 0 to 1.
 pub(crate) type Share = f32;
 
 /// Is told the share that is written, and may break off.
@@ -60,7 +60,7 @@ pub(crate) fn bytes(content: impl Into<Vec<u8>>) -> Content {
     Box::new(move |file, _| file.write_all(&content))
 }
 
-/// How the writing of several files ended.
+/// Outcome of writing several files.
 #[derive(Debug)]
 pub(crate) enum Written {
     All(Vec<PathBuf>),
@@ -73,7 +73,7 @@ pub(crate) enum Written {
 /// Writes files one after the other; existing ones are replaced only if `replace`.
 ///
 /// # Errors
-/// A sentence that says what could not be written and the mend.
+/// A sentence that says what could not be written and the remedy.
 pub(crate) fn write_files(files: Files, replace: bool, watch: Watch<'_>) -> Result<Written, String> {
     let paths = files.iter().map(|(path, _)| path);
     let existing: Vec<_> = paths.filter(|path| path.symlink_metadata().is_ok()).cloned().collect();
@@ -103,10 +103,10 @@ pub(crate) fn write_files(files: Files, replace: bool, watch: Watch<'_>) -> Resu
     Ok(Written::All(written))
 }
 
-/// Why a file was not written, and the mend.
+/// Reason why a file was not written, and the remedy.
 fn not_saved(path: &Path, error: &io::Error) -> String {
     format!(
-        "{} could not be saved: {error}; check the folder, its permissions and the space on the disk.",
+        "{} could not be saved: {error}; check the folder, its permissions and the free disk space.",
         path.display()
     )
 }

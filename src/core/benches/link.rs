@@ -5,12 +5,14 @@ use std::time::Duration;
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
-use flqr_core::link::candump::{Entry, parse_line, write_line};
-use flqr_core::link::jy901::{Decoder, Packet};
-use flqr_core::link::lk::{Command, MotorId, Reply, ReplyId, State2};
-use flqr_core::link::slcan::{Answer, AnswerDecoder};
-use flqr_core::link::{Direction, Frame, ImuAssembler, StampedFrame, Wheels, bus_load};
-use flqr_core::robot::{LinkSettings, StateLayout};
+use flqr_core::link::{
+    Direction, Frame, ImuAssembler, StampedFrame, Wheels, bus_load,
+    candump::{Entry, parse_line, write_line},
+    jy901::{Decoder, Packet},
+    lk::{Command, MotorId, Reply, ReplyId, State2},
+    slcan::{Answer, AnswerDecoder},
+};
+use flqr_core::model::{LinkSettings, StateLayout};
 
 const FRAMES: u32 = 10_000;
 

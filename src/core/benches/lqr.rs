@@ -3,8 +3,8 @@
 //! `cargo bench -p flqr-core --bench lqr`
 
 use divan::{Bencher, black_box};
-use flqr_core::lqr::{CareInput, SampledLoop, Weights, design, margins, solve_care};
-use flqr_core::robot::{LinearModel, RobotParameters};
+use flqr_core::lqr::{CareInput, SampledLoop, design, margins, solve_care};
+use flqr_core::model::{LinearModel, RobotParameters, Weights};
 use nalgebra::{DMatrix, DVector};
 
 fn main() {
@@ -31,7 +31,7 @@ fn design_of_the_robot(bencher: Bencher) {
     bencher.bench_local(|| design(black_box(&model), black_box(&weights)));
 }
 
-/// What the margins of the loop as it runs add to the drag: 1 kHz, 4 ms of delay, 100 Hz IMU.
+/// What the margins of the sampled loop add to the drag: 1 kHz, 4 ms of delay, 100 Hz IMU.
 #[divan::bench(sample_size = 10)]
 fn margins_of_the_robot(bencher: Bencher) {
     let (model, weights) = (robot(), Weights::diagonal([60.0, 30.0, 100.0, 5.0], [20.0, 20.0]));

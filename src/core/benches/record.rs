@@ -1,4 +1,4 @@
-//! Loading a log, beside a loop over the records of the csv crate that does nothing but parse the numbers; and the
+//! Loading a log, next to a loop over the records of the csv crate that does nothing but parse the numbers; and the
 //! text of a recording.
 
 use std::fmt::Write;

@@ -1,7 +1,7 @@
 //! One tick of 1 ms: plants alone, and the whole closed loop with sensors and noise.
 //!
 //! `cargo bench -p flqr-core --bench simulate`; 1 ms divided by the time of a tick is the speed relative
-//! to real time. `peers.py` beside this file runs it together with numba, MuJoCo and SciPy on the same
+//! to real time. `peers.py` next to this file runs it together with numba, MuJoCo and SciPy on the same
 //! robot and prints the ratios.
 
 use std::num::NonZeroUsize;
@@ -10,8 +10,7 @@ use divan::Bencher;
 use divan::counter::ItemsCount;
 use flqr_core::control::{BalanceController, ControllerKind};
 use flqr_core::lqr;
-use flqr_core::model_file::{Model, RobotModel};
-use flqr_core::robot::{RobotParameters, State};
+use flqr_core::model::{Model, RobotModel, RobotParameters, State};
 use flqr_core::simulate::{
     Forcing, PlanarPlant, Plant, Simulation, SimulationSettings, Trial, advance_batch, monte_carlo,
 };
@@ -44,7 +43,7 @@ const PEERS_ROBOT: RobotParameters = RobotParameters {
 
 /// The peers' weights: Q = diag(10, 1, 100, 1), R = 1.
 fn peers_gain() -> nalgebra::Matrix2x4<f64> {
-    let weights = lqr::Weights::diagonal([10.0, 1.0, 100.0, 1.0], [1.0; 2]);
+    let weights = flqr_core::model::Weights::diagonal([10.0, 1.0, 100.0, 1.0], [1.0; 2]);
     lqr::design(&PEERS_ROBOT.linear_model(), &weights).expect("the peers' robot has a design").gain
 }
 

@@ -1,12 +1,11 @@
 //! Accuracy of the refinement over the cases of the independent generator, as a table.
 //!
-//! `cargo bench -p flqr-core --bench undeclared -- [family…] [--first ROUND] [--rounds N] [--noise FACTOR]
-//! [--seconds LENGTH] [--alone] [--verbose]`;
-//! families: clean, tolerance, single, quarter, pairs, outside, the same of a motor on a bench behind `bench-` (`bench`
-//! for all of those), the id of an effect, or the generator's name of one. Rounds 0 to 29 are for
-//! work on the method; figures are told from later ones. `--seconds` makes logs of that length without another
-//! log beside them, so that the last third is held out; `--alone` judges one case at a time, which is what its time is
-//! to be measured with.
+//! `cargo bench -p flqr-core --bench undeclared -- [family…] [--first ROUND] [--rounds N] [--noise FACTOR] [--seconds
+//! LENGTH] [--alone] [--verbose]`; families: clean, tolerance, single, quarter, pairs, outside, the same of a motor
+//! on a bench behind `bench-` (`bench` for all of those), the id of an effect, or the generator's name of one. Rounds
+//! 0 to 29 are for work on the method; figures are distinguished from later ones. `--seconds` makes logs of that
+//! length without another log next to them, so that the last third is held out; `--alone` assesses one case at a
+//! time, which is what its time is to be measured with.
 
 #![expect(clippy::print_stdout, clippy::disallowed_methods, reason = "a table for people, with its time")]
 #[path = "../tests/undeclared/generator/mod.rs"]
@@ -17,7 +16,7 @@ use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
 use std::time::Instant;
 
-use flqr_core::model_file::Model;
+use flqr_core::model::Model;
 use flqr_core::record::Log;
 use flqr_core::refine::{Options, Refinement, Verdict, refine};
 use generator::bench_cases::{self, BenchCase, Flaw};
@@ -89,7 +88,8 @@ struct Outcome {
     all_right: bool,
     unexplained: bool,
     ratio: f64,
-    /// Of each size that is known: whether it is in its interval, by what share it is off, and the interval's half width.
+    /// Of each size that is known: whether it is in its interval, by what share it is off, and the interval's half
+    /// width.
     sizes: Vec<(bool, f64, f64)>,
 }
 
@@ -132,7 +132,7 @@ impl Wanted {
         wanted
     }
 
-    /// Cases of the rounds that are asked for; every round has seeds of its own.
+    /// Cases of the rounds that are requested; every round has seeds of its own.
     fn cases(&self) -> Vec<(&'static str, Trial)> {
         let mut list = Vec::new();
         let mut add = |family: &'static str, case: Trial| {
@@ -249,7 +249,9 @@ fn told(found: &Refinement, ratio: f64) -> String {
         .candidates
         .iter()
         .take(4)
-        .map(|c| format!("{} {} {:.2}% z{:.1} {}", c.kind.id, c.detail, c.gain_percent, c.z, c.fate.name()))
+        .map(|c| {
+            format!("{} {} {:.2}% z{:.1} {}", c.kind.id, c.detail, c.gain_percent, c.z, c.outcome.name())
+        })
         .collect();
     format!(
         "{:?} {} | x{ratio:.2} {} {:?} {errors:?}\n      tried {tried:?}\n     ",

@@ -7,10 +7,9 @@ use nalgebra::{Matrix2x4, Vector2};
 use super::odometry::{Measurement, Odometry};
 use super::yaw::default_yaw_hold;
 use crate::ParameterError;
-use crate::effects::{EffectFeedforward, Machine, Moment};
+use crate::effects::{EffectFeedforward, Machine, MotionSample};
 use crate::friction::{Compensation, Feedforward};
-use crate::model_file::RobotModel;
-use crate::robot::{Motor, State, YawHold};
+use crate::model::{Motor, RobotModel, State, YawHold};
 
 /// Compensation of models that give friction but no `[compensation]`: a little less than the whole curve,
 /// so that a curve that was identified 10 % too high does not drive the robot by itself, and a direction
@@ -47,18 +46,18 @@ pub struct BalanceController {
     pub effects: Option<Arc<EffectFeedforward>>,
     /// Largest torque of one motor, N m; infinite if unlimited.
     pub torque_limit_nm: f64,
-    /// What keeps the heading.
+    /// Heading control.
     pub yaw_hold: YawHold,
-    /// How the robot makes a measurement of its sensors' readings.
+    /// Computation of a measurement from sensor readings.
     pub odometry: Odometry,
 }
 
-/// Why a controller cannot be made from a model.
+/// Reason why a controller cannot be created from a model.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ControlError {
     /// FLQR without anything to feed forward.
     #[error(
-        "flqr needs the friction of at least one motor: add [friction.left] and [friction.right] or use lqr"
+        "flqr needs the friction of at least one motor: add [friction.left] and [friction.right], or use lqr"
     )]
     NoFriction,
     /// A gain that is infinite or not a number.
@@ -96,12 +95,29 @@ impl BalanceController {
         })
     }
 
-    /// Torques of the left and the right motor, N m: K (X̃ − X) (Eq. 26) plus the yaw hold, in equal and
-    /// opposite shares, plus the feedforward at each motor's speed (Eq. 29) and what makes up for the effects inside
-    /// the motor, within the limit; 0 where a measurement is not a number, so that a sensor that failed cannot drive the robot.
+    /// Torques of the left and the right motor, N m: K (X̃ − X) (Eq. 26) plus the yaw hold, in equal and opposite
+    /// shares, plus the feedforward at each motor's speed (Eq. 29) and what makes up for the effects inside the
+    /// motor, within the limit; 0 where a measurement is not a number, so that a sensor that failed cannot drive the
+    /// robot.
     ///
     /// The yaw hold follows the difference of the wheels alone, so that it is the same at any speed, and the
     /// balance their mean alone, so that neither disturbs the other.
+    ///
+    /// ```
+    /// # let model = flqr_core::model_file::presets::paper();
+    /// # let robot = model.robot().ok_or("no robot")?;
+    /// # let linear = robot.parameters.linear_model();
+    /// # let gain = flqr_core::lqr::design(&linear, &robot.weights.ok_or("no weights")?)?.gain;
+    /// # use flqr_core::control::{BalanceController, ControllerKind};
+    /// use flqr_core::control::{Measurement, Reference};
+    /// use flqr_core::model::State;
+    ///
+    /// let controller = BalanceController::new(ControllerKind::Lqr, robot, gain)?;
+    /// let state = State { pitch_rad: 0.01, ..State::default() };
+    /// let [left, right] = controller.step(&Measurement { state, ..Measurement::default() }, &Reference::default());
+    /// assert!(left > 0.0 && left == right); // The wheels drive under the body, which tilts forward.
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn step(&self, measurement: &Measurement, reference: &Reference) -> [f64; 2] {
         let error = reference.state.to_vector() - measurement.state.to_vector();
         let feedback: Vector2<f64> = self.gain * error;
@@ -120,26 +136,26 @@ impl BalanceController {
 }
 
 impl BalanceController {
-    /// Whether it feeds effects forward that depend on the rotors' own angles.
+    /// Returns whether it feeds effects forward that depend on the rotors' own angles.
     pub fn needs_rotor_angle(&self) -> bool {
         let effects = self.effects.iter().flat_map(|effects| effects.effects());
         effects.into_iter().any(|effect| effect.kind().by_angle())
     }
 
-    /// The same without the effects that depend on the rotor's own angle, for motors whose angles count from
+    /// Returns it without the effects that depend on the rotor angle, for motors whose angles are relative to
     /// elsewhere.
     pub fn without_rotor_angle(self) -> Self {
         let effects = self.effects.as_ref().and_then(|effects| effects.without_rotor_angle());
         Self { effects: effects.map(Arc::new), ..self }
     }
 
-    /// What has to be asked of a motor for a torque, N m.
+    /// Returns the command that gives a torque, N m.
     fn with_effects(&self, motor: usize, measurement: &Measurement, torque_nm: f64) -> f64 {
         let Some(effects) = &self.effects else { return torque_nm };
-        let moment = Moment {
+        let moment = MotionSample {
             motor_angle_rad: measurement.motor_angle_rad[motor],
             motor_speed_rad_s: measurement.motor_speed_rad_s[motor],
-            ..Moment::default()
+            ..MotionSample::default()
         };
         effects.asked_nm(Motor::BOTH[motor], &moment, torque_nm)
     }
@@ -157,7 +173,7 @@ fn check_gain(gain: &Matrix2x4<f64>) -> Result<(), ControlError> {
     Ok(())
 }
 
-/// What is fed forward of both motors' friction, and of the effects inside them.
+/// Returns the feedforward of friction and effects of both motors.
 type Fed = ([Option<Feedforward>; 2], Option<Arc<EffectFeedforward>>);
 
 fn feedforward(robot: &RobotModel) -> Result<Fed, ControlError> {

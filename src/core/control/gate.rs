@@ -1,4 +1,4 @@
-//! Admission of new gains to a driven robot: stability margins of the loop as it runs, and size of the change.
+//! Admission of new gains to a driven robot: stability margins of the sampled loop, and size of the change.
 
 use std::f64::consts::PI;
 
@@ -8,8 +8,7 @@ use super::Reference;
 use super::balance::{BalanceController, ControllerKind};
 use super::odometry::Measurement;
 use crate::lqr::{Margins, SampledLoop, margins, sampled_poles};
-use crate::model_file::RobotModel;
-use crate::robot::State;
+use crate::model::{RobotModel, State};
 
 /// Least gain margin, up and down, as a factor: 3 dB. A torque constant, a mass or a supply voltage that is off by a
 /// third leaves the loop stable.
@@ -79,22 +78,22 @@ pub enum Refusal {
         delay_s: f64,
     },
     /// A gain margin is too small.
-    #[error("the loop tolerates a gain error of {:.1} dB only, at least 3 dB are needed: {remedy}", decibels(*factor))]
+    #[error("the gain margin is {:.1} dB, at least 3 dB are required: {remedy}", decibels(*factor))]
     GainMargin {
         /// Factor of all gains at which the loop becomes unstable.
         factor: f64,
-        /// What to change.
+        /// Remedy.
         remedy: &'static str,
     },
     /// The phase margin is too small.
-    #[error("the phase margin is {:.0}°, at least 20° are needed: raise the weights R or lower Q", phase_rad.to_degrees())]
+    #[error("the phase margin is {:.0}°, at least 20° are required: raise the weights R or lower Q", phase_rad.to_degrees())]
     PhaseMargin {
         /// Phase margin, rad.
         phase_rad: f64,
     },
     /// The delay margin is too small.
     #[error(
-        "the loop tolerates {:.1} ms more delay only, at least 2 ms are needed: raise the weights R or lower Q",
+        "the delay margin is {:.1} ms, at least 2 ms are required: raise the weights R or lower Q",
         1e3 * delay_s
     )]
     DelayMargin {
@@ -103,8 +102,8 @@ pub enum Refusal {
     },
     /// A mode decays too slowly.
     #[error(
-        "the slowest mode has a time constant of {seconds:.0} s, at most 10 s are allowed, because the robot drifts off \
-         before: raise the weights of displacement and velocity, or lower R"
+        "the slowest mode has a time constant of {seconds:.0} s, at most 10 s are allowed to prevent drift: \
+         raise the weights of displacement and velocity, or lower R"
     )]
     Slow {
         /// Time constant, s.
@@ -112,8 +111,8 @@ pub enum Refusal {
     },
     /// The feedforward exceeds that of the robot's own model.
     #[error(
-        "the feedforward exceeds that of the model that the robot was connected with by {excess_nm:.2} N m, at most \
-         {largest_nm:.2} N m are allowed: correct the friction, or connect again with this model"
+        "the feedforward exceeds that of the model used for the connection by {excess_nm:.2} N m, at most \
+         {largest_nm:.2} N m are allowed: correct the friction, or reconnect with this model"
     )]
     Feedforward {
         /// Largest excess, N m.
@@ -143,6 +142,21 @@ pub fn judge(robot: &RobotModel, current: &Matrix2x4<f64>, new: &BalanceControll
 ///
 /// # Errors
 /// The first condition that is not met.
+///
+/// ```
+/// # let model = flqr_core::model_file::presets::paper();
+/// # let robot = model.robot().ok_or("no robot")?;
+/// # let linear = robot.parameters.linear_model();
+/// # let gain = flqr_core::lqr::design(&linear, &robot.weights.ok_or("no weights")?)?.gain;
+/// # use flqr_core::control::{BalanceController, ControllerKind};
+/// use flqr_core::control::gate;
+///
+/// let controller = BalanceController::new(ControllerKind::Flqr, robot, gain)?;
+/// assert!(gate::check(robot, &controller).is_ok());
+/// let reversed = BalanceController::new(ControllerKind::Flqr, robot, -gain)?;
+/// assert!(gate::check(robot, &reversed).is_err());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn check(robot: &RobotModel, controller: &BalanceController) -> Result<(), Refusal> {
     if let Some(GainChange { motor, state, .. }) =
         entries(&controller.gain, &controller.gain).find(|entry| !entry.new.is_finite())

@@ -15,7 +15,7 @@ mod speed;
 mod yaw;
 
 pub use balance::{BalanceController, ControlError, ControllerKind, DEFAULT_COMPENSATION, Reference};
-pub use odometry::{Measurement, Odometry, Readings};
+pub use odometry::{Measurement, Odometry};
 pub use program::{SpeedProgram, SpeedRun};
 pub use schedule::{GainSchedule, ScheduleError, ScheduleNode};
 pub use speed::{SpeedGains, SpeedPi, SpeedPiState};

@@ -1,22 +1,9 @@
 //! From what the sensors read to what the controller knows.
 
-use crate::model_file::RobotModel;
-use crate::robot::State;
+use crate::model::{RobotModel, State};
+use crate::record::Readings;
 
-/// What the robot's sensors give at one tick.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Readings {
-    /// Encoders q, left and right, rad.
-    pub motor_angle_rad: [f64; 2],
-    /// Motor speeds q̇, left and right, rad/s.
-    pub motor_speed_rad_s: [f64; 2],
-    /// Pitch θ of the IMU, rad.
-    pub pitch_rad: f64,
-    /// Pitch rate θ̇ of the IMU, rad/s.
-    pub pitch_rate_rad_s: f64,
-}
-
-/// What a controller knows at one tick.
+/// Measurement of a controller at one sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Measurement {
     /// X as the robot estimates it from encoders and IMU.
@@ -53,6 +40,20 @@ impl Odometry {
 
     /// x = r (q + θ) of the wheels' mean q, ψ = r (q_r − q_l)/track of their difference, and the same of
     /// the speeds.
+    ///
+    /// ```
+    /// # let model = flqr_core::model_file::presets::paper();
+    /// # let robot = model.robot().ok_or("no robot")?;
+    /// use flqr_core::control::Odometry;
+    /// use flqr_core::record::Readings;
+    ///
+    /// // One turn of both wheels forward, with the body upright.
+    /// let readings = Readings { motor_angle_rad: [std::f64::consts::TAU; 2], ..Readings::default() };
+    /// let measurement = Odometry::new(robot).measurement(&readings);
+    /// let circumference_m = std::f64::consts::TAU * robot.parameters.wheel_radius_m;
+    /// assert!((measurement.state.x_m - circumference_m).abs() < 1e-12 && measurement.yaw_rad == 0.0);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn measurement(&self, readings: &Readings) -> Measurement {
         let &Readings { motor_angle_rad, motor_speed_rad_s, pitch_rad, pitch_rate_rad_s } = readings;
         let radius = self.wheel_radius_m;

@@ -1,11 +1,11 @@
 //! Motors with their wheels in the air, put through a program under speed control.
 
 use super::speed::{SpeedPi, SpeedPiState};
+use crate::excitation::{Multisine, SpeedSweep, Step, multisines};
 use crate::friction::Stribeck;
-use crate::identify::excitation::{Multisine, SpeedSweep, Step, multisines};
-use crate::robot::TICK_S;
+use crate::model::TICK_S;
 
-/// What the motors are put through.
+/// Task of the motors.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SpeedProgram {
     /// A step of the target speed.

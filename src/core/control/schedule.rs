@@ -1,12 +1,12 @@
-//! Gains that follow the legs' height.
+//! Gains that follow leg height.
 
 use nalgebra::Matrix2x4;
 
 use crate::ParameterError;
 use crate::lqr::{DesignError, design};
-use crate::model_file::RobotModel;
+use crate::model::RobotModel;
 
-/// LQR gains over the legs' height, linear between their nodes as the firmware's table will be.
+/// LQR gains over leg height, linear between their nodes as the firmware's table will be.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GainSchedule {
     nodes: Vec<ScheduleNode>,
@@ -21,12 +21,12 @@ pub struct ScheduleNode {
     pub gain: Matrix2x4<f64>,
 }
 
-/// Why there is no schedule.
+/// Reason why there is no schedule.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ScheduleError {
     /// A robot of one height.
     #[error(
-        "the robot has one height only: give com_height_m in [robot] as a table over leg_height_m for a schedule"
+        "the robot has only one leg height: give com_height_m in [robot] as a table over leg_height_m for a schedule"
     )]
     NoLegs,
     /// A design needs weights.
@@ -46,7 +46,7 @@ pub enum ScheduleError {
     Design {
         /// Height, m.
         leg_height_m: f64,
-        /// What stands in the way.
+        /// Problem.
         problem: DesignError,
     },
 }
@@ -56,6 +56,17 @@ impl GainSchedule {
     ///
     /// # Errors
     /// A robot without legs or weights, fewer than 2 or more than 1000 nodes, a height without a design.
+    ///
+    /// ```
+    /// # let model = flqr_core::model_file::presets::paper();
+    /// # let robot = model.robot().ok_or("no robot")?;
+    /// use flqr_core::control::GainSchedule;
+    ///
+    /// let schedule = GainSchedule::design(robot, 6)?;
+    /// let [low, .., high] = schedule.nodes() else { return Err("too few nodes".into()) };
+    /// assert_ne!(schedule.at(low.leg_height_m), schedule.at(high.leg_height_m));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn design(robot: &RobotModel, nodes: usize) -> Result<Self, ScheduleError> {
         let legs = robot.legs.as_ref().ok_or(ScheduleError::NoLegs)?;
         let weights = robot.weights.ok_or(ScheduleError::NoWeights)?;

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::friction::Feedforward;
-use crate::robot::TICK_S;
+use crate::model::TICK_S;
 
 /// Gains of the speed control, as the paper's kp and ki.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -29,7 +29,7 @@ impl SpeedGains {
         Self { kp: 20.0 * inertia_kg_m2, ki: 20.0 * inertia_kg_m2 }
     }
 
-    /// Where the loop with an inertia crosses over, rad/s: |kp + ki/(jω)| = I ω.
+    /// Crossover frequency of the loop with an inertia, rad/s: |kp + ki/(jω)| = I ω.
     pub(crate) fn crossover_rad_s(self, inertia_kg_m2: f64) -> f64 {
         let (p, i) = (self.kp / inertia_kg_m2, self.ki / inertia_kg_m2);
         (0.5 * (p * p + (p * p * p * p + 4.0 * i * i).sqrt())).sqrt()
@@ -59,7 +59,7 @@ pub struct SpeedPi {
     pub torque_limit_nm: f64,
 }
 
-/// What [`SpeedPi`] remembers from tick to tick.
+/// State of [`SpeedPi`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SpeedPiState {
     /// Integral of the speed's error, rad.
@@ -71,6 +71,16 @@ impl SpeedPi {
     /// and nothing remembered of the tick, where a measurement is not a number.
     ///
     /// Against windup the integral stands still at the limit, unless the error leads away from it.
+    ///
+    /// ```
+    /// use flqr_core::control::{SpeedPi, SpeedPiState};
+    ///
+    /// let control =
+    ///     SpeedPi { proportional_nm_s_rad: 0.1, integral_nm_rad: 1.0, feedforward: None, torque_limit_nm: 0.3 };
+    /// let mut state = SpeedPiState::default();
+    /// assert!((control.step(&mut state, 2.0, 0.0, 0.001) - 0.2).abs() < 0.01);
+    /// assert_eq!(control.step(&mut state, 9.0, 0.0, 0.001), 0.3); // limited
+    /// ```
     pub fn step(&self, state: &mut SpeedPiState, target_rad_s: f64, measured_rad_s: f64, dt_s: f64) -> f64 {
         let error = target_rad_s - measured_rad_s;
         let friction = self.feedforward.map_or(0.0, |feedforward| feedforward.torque_nm(measured_rad_s));

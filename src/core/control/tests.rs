@@ -2,9 +2,11 @@ use nalgebra::Matrix2x4;
 
 use super::*;
 use crate::friction::{Compensation, Feedforward, Stribeck, StribeckParameters};
-use crate::lqr::{Weights, design};
-use crate::model_file::{Model, RobotModel};
-use crate::robot::{Chassis, HeightNode, Legs, MotorLimits, OverHeight, State, YawHold};
+use crate::lqr::design;
+use crate::model::{
+    Chassis, HeightNode, Legs, Model, MotorLimits, OverHeight, RobotModel, State, Weights, YawHold,
+};
+use crate::record::Readings;
 
 const MODEL: &str = r#"
 name = "bench robot"

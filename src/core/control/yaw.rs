@@ -1,6 +1,6 @@
 //! The yaw hold of models that give none.
 
-use crate::robot::{Chassis, RobotParameters, YawHold};
+use crate::model::{Chassis, RobotParameters, YawHold};
 
 /// Natural frequency of the turning body under the default hold, rad/s: a friction that differs by 0.02 N m
 /// turns the paper's robot by 0.1°, and at twice this frequency, where the hold's gain passes 1, 4 ms of delay

@@ -73,7 +73,7 @@ impl BusHealth {
         guard(&self.lost).clone()
     }
 
-    /// What may be wrong where nothing is heard, and the mend.
+    /// What may be wrong where nothing is received, and the remedy.
     pub fn hint(&self) -> Option<String> {
         guard(&self.hint).clone()
     }

@@ -17,7 +17,7 @@ use super::interfaces;
 use super::open_error::OpenError;
 use crate::link::{Bus, BusError, Direction, Frame, FrameId, FrameKind, StampedFrame};
 
-/// Bytes of the receive buffer that are asked for: half a second of a full bus, where the kernel takes about 1 kB a
+/// Bytes of the receive buffer that are requested: half a second of a full bus, where the kernel takes about 1 kB a
 /// frame. Without a privilege it gives less (`net.core.rmem_max`).
 const RECEIVE_BUFFER: usize = 4 << 20;
 
@@ -47,7 +47,7 @@ impl SocketCan {
     /// itself still acknowledges frames, unless the interface was set up with `listen-only on`.
     ///
     /// # Errors
-    /// [`OpenError`] names what is missing and its mend.
+    /// [`OpenError`] names what is missing and its remedy.
     pub fn open(name: &str, listen_only: bool, health: Arc<BusHealth>) -> Result<Self, OpenError> {
         let socket = CanSocket::open(name).map_err(|error| why_closed(name, &error))?;
         interfaces::require_up(name)?;
@@ -123,9 +123,7 @@ impl SocketCan {
         let (name, reason) = (self.name.clone(), error.to_string());
         match error.raw_os_error().map(Errno::from_raw) {
             Some(Errno::ENOBUFS | Errno::EAGAIN) => BusError::Full { name },
-            Some(Errno::ENETDOWN) => {
-                BusError::Gone { name, reason: "the interface was taken down".to_owned() }
-            }
+            Some(Errno::ENETDOWN) => BusError::Gone { name, reason: "the interface was set down".to_owned() },
             Some(Errno::ENODEV | Errno::ENXIO) => {
                 BusError::Gone { name, reason: "the interface was unplugged or removed".to_owned() }
             }
@@ -237,19 +235,19 @@ fn state_in(frame: &Frame) -> Option<BusState> {
     }
 }
 
-/// What to look at where nothing is heard.
+/// What to look at where nothing is received.
 fn hint(name: &str, state: BusState) -> String {
     match (state, interfaces::bit_rate(name)) {
         (BusState::BusOff, _) => format!(
             "{name} is BUS-OFF: check bit rate, wiring and termination, then `sudo ip link set {name} type can restart`"
         ),
         (BusState::ErrorPassive, Some(rate)) => format!(
-            "{name} is ERROR-PASSIVE at {rate} bit/s: is that the robot's bit rate, and are both ends terminated?"
+            "{name} is ERROR-PASSIVE at {rate} bit/s: check the bit rate of the robot and the termination at both ends"
         ),
         (_, Some(rate)) => {
-            format!("nothing is heard on {name} at {rate} bit/s: is the robot on, and is that its bit rate?")
+            format!("no frames on {name} at {rate} bit/s: check that the robot is on and uses this bit rate")
         }
-        (_, None) => format!("nothing is heard on {name}: is anything sending there?"),
+        (_, None) => format!("no frames on {name}: check that a device is sending there"),
     }
 }
 
@@ -261,8 +259,8 @@ fn why_closed(name: &str, error: &io::Error) -> OpenError {
         Some(Errno::ENODEV | Errno::ENXIO) => interfaces::why_no_interface(name),
         Some(Errno::EPERM | Errno::EACCES) => OpenError::NoPermission {
             name: interface,
-            mend: "raw CAN sockets are closed to this user: run it outside of the sandbox or container, or give \
-                   the container CAP_NET_RAW"
+            remedy: "raw CAN sockets are not permitted: run flqr outside of the sandbox or container, \
+                   or give the container CAP_NET_RAW"
                 .to_owned(),
         },
         _ => OpenError::Failed { name: interface, reason: error.to_string() },

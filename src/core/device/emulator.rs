@@ -8,7 +8,8 @@ use super::open_error::OpenError;
 use super::pacer::hurry;
 use super::pty::Pty;
 use super::session::Source;
-use crate::link::{EmulatedAdapter, Emulator, StampedFrame};
+use crate::emulator::{EmulatedAdapter, Emulator};
+use crate::link::StampedFrame;
 
 /// Bytes of the IMU that may wait to be read: more are those of a port that nobody has open.
 const IMU_WAITING: u32 = 2048;
@@ -53,7 +54,7 @@ impl EmulatorServer {
     /// Opens the ports.
     ///
     /// # Errors
-    /// [`OpenError`]: what is missing, and the mend.
+    /// [`OpenError`]: what is missing, and the remedy.
     pub fn open(ports: &EmulatorPorts) -> Result<Self, OpenError> {
         let clock = Clock::start();
         let can = ports

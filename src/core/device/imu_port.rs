@@ -19,7 +19,7 @@ const READ_TIME: Duration = Duration::from_millis(20);
 const WRITE_TIME: Duration = Duration::from_millis(100);
 
 /// An open line, which is opened anew by itself where it is lost. Nothing is sent unless [`ImuPort::configure`] is
-/// asked for.
+/// requested.
 pub struct ImuPort {
     address: SerialAddress,
     clock: Clock,
@@ -28,10 +28,10 @@ pub struct ImuPort {
     reconnects: u64,
 }
 
-/// Opens the line of an IMU. A port that has a name of its own for good is found by that again.
+/// Opens the line of an IMU. A port that has a separate name permanently is found by that again.
 ///
 /// # Errors
-/// [`OpenError`]: what is wrong with the port, and the mend.
+/// [`OpenError`]: what is wrong with the port, and the remedy.
 pub fn open_imu(address: &SerialAddress) -> Result<ImuPort, OpenError> {
     let line = SerialLine::open(&address.port, address.baud)?;
     let port = interfaces::stable_name(&address.port).unwrap_or_else(|| address.port.clone());
@@ -68,7 +68,7 @@ impl ImuPort {
         self.line.is_some()
     }
 
-    /// Sets rate, baud rate and content of the IMU for good; from then on the line has that baud rate.
+    /// Sets rate, baud rate and content of the IMU permanently; from then on the line has that baud rate.
     ///
     /// # Errors
     /// [`ImuConfigureError`].
@@ -118,10 +118,10 @@ pub enum ImuConfigureError {
     #[error(transparent)]
     Port(#[from] OpenError),
     /// The port is lost.
-    #[error("the IMU's port is lost: plug it in and try again")]
+    #[error("the port of the IMU is gone: reconnect it and try again")]
     Lost,
     /// What the system says.
-    #[error("the IMU's port takes no bytes: {reason}")]
+    #[error("cannot write to the port of the IMU: {reason}")]
     Failed {
         /// What the system said.
         reason: String,

@@ -50,7 +50,7 @@ pub struct CanInterface {
     pub errors: u64,
     /// Frames that the driver dropped, both ways.
     pub dropped: u64,
-    /// What brings it up; none where it is.
+    /// What brings it up; `None` if it is.
     pub command: Option<String>,
 }
 

@@ -1,5 +1,5 @@
 //! The one room with effects: sockets, serial ports, files of a recording, threads and clocks.
-#![expect(clippy::disallowed_methods, reason = "the one room of the core that meets the system")]
+#![expect(clippy::disallowed_methods, reason = "the only module of the core with system calls")]
 
 mod bus_health;
 #[cfg(target_os = "linux")]

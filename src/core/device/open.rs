@@ -23,7 +23,7 @@ pub struct BusPair {
 /// Opens a source with a wire. With `listen_only` not one frame can be sent, by either half.
 ///
 /// # Errors
-/// [`OpenError`]: what is missing, and the mend. Emulated and replayed sources have no wire.
+/// [`OpenError`]: what is missing, and the remedy. Emulated and replayed sources have no wire.
 pub fn open_bus(source: &Source, listen_only: bool, clock: &Clock) -> Result<BusPair, OpenError> {
     let health = Arc::new(BusHealth::default());
     let (name, open) = match source {

@@ -1,4 +1,4 @@
-//! Why a bus or a port cannot be opened, each with its mend.
+//! Why a bus or a port cannot be opened, each with its remedy.
 
 /// Why a bus or a port cannot be opened.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -9,24 +9,24 @@ pub enum OpenError {
          use an SLCAN adapter with slcan:PORT"
     )]
     NoCan {
-        /// What was asked for.
+        /// What was requested.
         interface: String,
     },
     /// No interface of that name.
     #[error(
-        "there is no CAN interface {interface}; there {present}: plug the adapter in, or make one by \
+        "there is no CAN interface {interface}; there {present}: plug the adapter in, or create one with \
          `sudo ip link add dev vcan0 type vcan` and `sudo ip link set vcan0 up`"
     )]
     NoInterface {
-        /// What was asked for.
+        /// What was requested.
         interface: String,
         /// Those that exist, in words.
         present: String,
     },
     /// A network interface of another sort.
-    #[error("{interface} is no CAN interface; there {present}")]
+    #[error("{interface} is not a CAN interface; there {present}")]
     NotCan {
-        /// What was asked for.
+        /// What was requested.
         interface: String,
         /// Those that exist, in words.
         present: String,
@@ -42,22 +42,22 @@ pub enum OpenError {
     /// No serial port of that name.
     #[error("there is no serial port {port}; there {present}: plug the adapter in")]
     NoPort {
-        /// What was asked for.
+        /// What was requested.
         port: String,
         /// Those that exist, in words.
         present: String,
     },
     /// The user may not.
-    #[error("{name} may not be opened: {mend}")]
+    #[error("permission denied for {name}: {remedy}")]
     NoPermission {
         /// Interface or port.
         name: String,
         /// What would allow it.
-        mend: String,
+        remedy: String,
     },
     /// Another program has it.
     #[error(
-        "{port} is in use: close the other program (slcand, ModemManager, a terminal; `fuser -v {port}` tells)"
+        "{port} is in use: close the other program (slcand, ModemManager, a terminal; `fuser -v {port}` shows it)"
     )]
     InUse {
         /// The port.
@@ -65,17 +65,17 @@ pub enum OpenError {
     },
     /// A bit rate that the adapter's protocol has not.
     #[error(
-        "SLCAN has no bit rate of {bit_rate} bit/s: it has 10000, 20000, 50000, 100000, 125000, 250000, 500000, 800000 \
+        "SLCAN does not support {bit_rate} bit/s: use 10000, 20000, 50000, 100000, 125000, 250000, 500000, 800000 \
          and 1000000"
     )]
     BitRate {
-        /// What was asked for.
+        /// What was requested.
         bit_rate: u32,
     },
     /// An adapter that does not do what it is told.
     #[error(
-        "{port} refuses the command {command}: is it an adapter that speaks SLCAN, and does it know this bit rate and \
-         (to listen) the command L?"
+        "{port} rejects the command {command}: check that it is an SLCAN adapter that supports this bit rate and, \
+         for listen-only, the command L"
     )]
     Refused {
         /// The port.
@@ -84,7 +84,7 @@ pub enum OpenError {
         command: String,
     },
     /// A source that is no bus.
-    #[error("{source_name} is no bus that can be opened")]
+    #[error("{source_name} is not a bus that can be opened")]
     NoBus {
         /// The source.
         source_name: String,

@@ -89,7 +89,9 @@ pub fn hurry() -> Priority {
     match (real_time(), slack) {
         (Ok(()), _) => Priority::RealTime,
         (Err(reason), Ok(())) => Priority::Usual(reason),
-        (Err(reason), Err(slack)) => Priority::Usual(format!("{reason}; the timer's slack stays: {slack}")),
+        (Err(reason), Err(slack)) => {
+            Priority::Usual(format!("{reason}; the timer slack is unchanged: {slack}"))
+        }
     }
 }
 

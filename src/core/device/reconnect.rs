@@ -109,7 +109,7 @@ impl Reconnecting {
     }
 
     fn gone(&self) -> BusError {
-        BusError::Gone { name: self.name.clone(), reason: "it is being looked for".to_owned() }
+        BusError::Gone { name: self.name.clone(), reason: "reconnecting".to_owned() }
     }
 }
 
@@ -129,7 +129,7 @@ impl Bus for Reconnecting {
                 Ok(Some(frame))
             }
             Ok(None) if self.writer.broken.load(Ordering::Relaxed) => {
-                let reason = "sending is not possible any more".to_owned();
+                let reason = "sending is no longer possible".to_owned();
                 Err(self.lose(BusError::Gone { name: self.name.clone(), reason }))
             }
             Ok(None) => Ok(None),
@@ -152,7 +152,7 @@ impl Bus for Sender {
     fn send(&mut self, now: Duration, frame: &Frame) -> Result<(), BusError> {
         let mut slot = self.slot.bus();
         let Some(bus) = slot.as_mut() else {
-            let reason = "it is being looked for".to_owned();
+            let reason = "reconnecting".to_owned();
             return Err(BusError::Gone { name: self.name.clone(), reason });
         };
         let sent = bus.send(now, frame);

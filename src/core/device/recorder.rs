@@ -31,13 +31,13 @@ const QUEUE: usize = 1 << 15;
 #[derive(Debug, thiserror::Error)]
 pub enum RecorderError {
     /// One of its files is there already.
-    #[error("{} is there already and is not overwritten: give another name or move it away", file.display())]
+    #[error("{} exists and is not overwritten: give another name or move it away", file.display())]
     Exists {
         /// The file.
         file: PathBuf,
     },
     /// The folder it is to be in is not there.
-    #[error("{}: the folder {} is not there: make it or give another name", file.display(), folder.display())]
+    #[error("{}: the folder {} does not exist: create it or give another name", file.display(), folder.display())]
     NoFolder {
         /// The file.
         file: PathBuf,
@@ -49,7 +49,7 @@ pub enum RecorderError {
     Failed {
         /// The file.
         file: PathBuf,
-        /// What the system said.
+        /// Message of the system.
         error: io::Error,
     },
 }
@@ -155,7 +155,7 @@ impl Recorder {
         if let Some(thread) = self.thread.take() {
             thread.thread().unpark();
             if thread.join().is_err() {
-                let problem = "the recording has ended by a fault of this program";
+                let problem = "the recording has stopped by an internal error";
                 self.input.shared.status().problem.get_or_insert_with(|| problem.to_owned());
             }
         }
@@ -184,7 +184,7 @@ impl RecorderInput {
         self.hand_over(Item::Frame(*frame));
     }
 
-    /// An intact packet of the IMU and when it was heard, since the start of the session.
+    /// An intact packet of the IMU and when it was received, since the start of the session.
     pub fn imu_packet(&self, time: Duration, packet: &Packet) {
         self.hand_over(Item::ImuPacket(time, *packet));
     }

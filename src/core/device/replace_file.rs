@@ -13,7 +13,7 @@ const LINK_LIMIT: usize = 40;
 /// Temporary files of the replacements under way.
 static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
-/// Writes a file by way of a temporary one beside it, so that a failure or a crash leaves the previous content or the
+/// Writes a file by way of a temporary one next to it, so that a failure or a crash leaves the previous content or the
 /// new one. Links stay links, and an existing file keeps its mode and its owner. Devices and pipes are written to
 /// directly. Each call has a temporary file of its own, so that concurrent calls never mix their contents.
 ///
@@ -40,8 +40,8 @@ pub fn replace_file(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>
     }
 }
 
-/// Checks that [`replace_file`] could begin: the folder is there and can be written, and no folder or read-only file is in
-/// the way.
+/// Checks that [`replace_file`] could begin: the folder is there and can be written, and no folder or read-only file
+/// is in the way.
 ///
 /// # Errors
 /// What stands in the way.

@@ -110,8 +110,9 @@ fn why_closed(name: &str, error: &serialport::Error) -> OpenError {
         ErrorKind::Io(io::ErrorKind::PermissionDenied) if cfg!(windows) => OpenError::InUse { port },
         ErrorKind::Io(io::ErrorKind::PermissionDenied) => OpenError::NoPermission {
             name: port,
-            mend: "join the group of serial ports with `sudo usermod -aG dialout $USER`, then log out and in"
-                .to_owned(),
+            remedy:
+                "join the group of serial ports with `sudo usermod -aG dialout $USER`, then log out and in"
+                    .to_owned(),
         },
         ErrorKind::Io(io::ErrorKind::NotFound) => interfaces::why_no_port(name),
         // The library says the same of a port that is locked and, on Windows, of one that is not there.

@@ -88,17 +88,17 @@ pub(super) fn open(
     Ok((reader, writer))
 }
 
-/// What to look at where nothing is heard.
+/// What to look at where nothing is received.
 fn hint(name: &str, bit_rate: u32, answers: bool) -> String {
     if !answers {
         return format!(
-            "{name} has not answered a single command: is it an SLCAN adapter? Some adapters never answer; then check \
-             the bus: is the robot on, and is {bit_rate} bit/s its bit rate?"
+            "{name} has not answered any command: check that it is an SLCAN adapter; some adapters never \
+             answer, then check that the robot is on and uses {bit_rate} bit/s"
         );
     }
     format!(
-        "nothing is heard on {name} at {bit_rate} bit/s: is the robot on, is that its bit rate, and are both ends \
-         terminated? Motors speak only when asked"
+        "no frames on {name} at {bit_rate} bit/s: check that the robot is on and uses this bit rate, and the termination \
+         at both ends; motors reply only to queries"
     )
 }
 
@@ -184,7 +184,7 @@ impl Reader {
                 // How many were lost, the adapter does not tell.
                 self.health.add_dropped(u64::from(errors.names().any(|name| name == "receive overrun")));
                 self.health.set_hint(format!(
-                    "{} reports errors on the bus ({}): check bit rate, wiring and termination",
+                    "{} reports bus errors ({}): check bit rate, wiring and termination",
                     self.name,
                     errors.names().collect::<Vec<_>>().join(", ")
                 ));

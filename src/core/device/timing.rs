@@ -76,7 +76,7 @@ pub enum TimingError {
     #[error(transparent)]
     Session(#[from] SessionError),
     /// The system gives no thread.
-    #[error("no thread for the bare timer loop: {0}")]
+    #[error("cannot start the bare timer loop: {0}")]
     Thread(#[from] io::Error),
     /// The checks took the whole run.
     #[error("the robot was not driven within the run of {seconds} s{open}: give a longer run")]
@@ -93,14 +93,12 @@ pub enum TimingError {
         reason: StopReason,
     },
     /// The session's thread has ended.
-    #[error(
-        "the session's thread ended before the run was over, which is a fault of this program: report it"
-    )]
+    #[error("the session thread ended before the end of the run, an internal error: report it")]
     Died,
 }
 
 impl TimingError {
-    /// What kept a run of this length from ending with a driven robot; none where nothing did.
+    /// What kept a run of this length from ending with a driven robot; `None` if nothing did.
     fn of(plan: TimingPlan, status: Option<&Status>) -> Option<Self> {
         let drive = status.and_then(|status| status.drive.as_ref());
         match drive.map(|drive| drive.stage) {
@@ -116,8 +114,8 @@ impl TimingError {
     }
 }
 
-/// Alternates runs of a bare timer loop and of a session's control loop; `watch` is told of the number of runs done, and
-/// may break off.
+/// Alternates runs of a bare timer loop and of a session's control loop; `watch` is told of the number of runs done,
+/// and may break off.
 ///
 /// # Errors
 /// [`TimingError`]; a robot that is not driven at the end of a run is one.

@@ -1,11 +1,11 @@
 //! All effects of a machine at once.
 
-use super::effect::{Effect, EffectLaw};
+use super::effect::EffectLaw;
 use super::kind::{Declared, Place};
-use super::law::{Action, Law, Moment};
+use super::law::{Action, Law, MotionSample};
 use super::machine::Machine;
-use crate::model_file::{AxisModel, RobotModel};
-use crate::robot::Motor;
+use crate::model::Effect;
+use crate::model::{AxisModel, Motor, RobotModel};
 
 /// The laws of a robot's effects, with their memories.
 #[derive(Clone, Debug)]
@@ -29,15 +29,15 @@ impl RobotLaws {
         }
     }
 
-    /// Whether there is none.
+    /// Returns whether there is none.
     pub fn is_empty(&self) -> bool {
         self.motors.iter().all(Vec::is_empty) && self.whole.is_empty()
     }
 
-    /// What they do at a moment, seen from the left and from the right motor: inside each motor, and on the robot as a
+    /// Their action at a sample, seen from the left and from the right motor: inside each motor, and on the robot as a
     /// whole.
-    pub fn act(&mut self, moments: &[Moment; 2]) -> ([Action; 2], Action) {
-        let sum = |laws: &mut Vec<EffectLaw>, moment: &Moment| {
+    pub fn act(&mut self, moments: &[MotionSample; 2]) -> ([Action; 2], Action) {
+        let sum = |laws: &mut Vec<EffectLaw>, moment: &MotionSample| {
             laws.iter_mut().fold(Action::default(), |sum, law| sum.plus(1.0, &law.act(moment)))
         };
         let [left, right] = &mut self.motors;

@@ -1,12 +1,12 @@
-//! Between the torque that is asked for and the one on the shaft.
+//! Between the commanded torque and the shaft torque.
 //!
-//! Each is what has to be added to the torque that is asked for.
+//! Each is what has to be added to the torque that is requested.
 
 use std::collections::VecDeque;
 
 use super::kind::{EffectKind, Feedforward, Grid, Parameter, Place, Signal, Step, Trial, undeclared};
-use super::law::{Action, Moment, Term};
-use super::machine::MachineKind;
+use super::law::{Action, MotionSample, Term};
+use crate::model::MachineKind;
 
 const EVERYWHERE: &[MachineKind] = &[MachineKind::Robot, MachineKind::Rotary, MachineKind::Linear];
 /// Delays and time constants that are tried, s.
@@ -15,54 +15,56 @@ const TIMES: Grid = Grid::Values(&[1e-3, 1.8e-3, 3.2e-3, 5e-3, 7.5e-3, 11e-3, 16
 /// Bus, queue and firmware.
 pub(super) static COMMAND_DELAY: EffectKind = EffectKind {
     id: "command_delay",
-    summary: "the torque acts a fixed time after it is asked for",
+    summary: "fixed delay between the torque command and the torque",
     place: Place::Actuator,
     machines: EVERYWHERE,
-    parameters: &[Parameter::shape("delay_s", [0.0, 0.5], "time from asking to acting")
+    parameters: &[Parameter::shape("delay_s", [0.0, 0.5], "delay from command to torque")
         .sized()
-        .tried(TIMES, Step::Factor(1.3))],
+        .searched(TIMES, Step::Factor(1.3))],
     wave: None,
     trial: Trial::PLAIN.of(Signal::MeasuredTorque),
     make_terms: |_, shape| {
         let mut line = DelayLine::new(shape[0]);
-        vec![Term::fixed(move |m: &Moment| Action::motor(line.delayed(m.torque_nm, m.dt_s) - m.torque_nm))]
+        vec![Term::fixed(move |m: &MotionSample| {
+            Action::motor(line.delayed(m.torque_nm, m.dt_s) - m.torque_nm)
+        })]
     },
-    separated_by: "torque with much of its power above 30 Hz",
-    feedforward: Feedforward::Never("a torque cannot act before it is asked for"),
+    separated_by: "torque with most of its power above 30 Hz",
+    feedforward: Feedforward::Never("a torque cannot act before it is commanded"),
     declare: undeclared,
 };
 
 /// The current's own control loop.
 pub(super) static ACTUATOR_LAG: EffectKind = EffectKind {
     id: "actuator_lag",
-    summary: "the torque follows the one that is asked for with a first-order lag",
+    summary: "first-order lag between the torque command and the torque",
     place: Place::Actuator,
     machines: EVERYWHERE,
     parameters: &[Parameter::shape("time_constant_s", [1e-5, 1.0], "time to 63 % of a step")
         .sized()
-        .tried(TIMES, Step::Factor(1.3))],
+        .searched(TIMES, Step::Factor(1.3))],
     wave: None,
     trial: Trial::PLAIN.of(Signal::MeasuredTorque),
     make_terms: |_, shape| {
         let mut lag = Lag::new(shape[0]);
-        vec![Term::fixed(move |m: &Moment| Action::motor(lag.mean(m.torque_nm, m.dt_s) - m.torque_nm))]
+        vec![Term::fixed(move |m: &MotionSample| Action::motor(lag.mean(m.torque_nm, m.dt_s) - m.torque_nm))]
     },
-    separated_by: "torque with much of its power above 30 Hz",
-    feedforward: Feedforward::Never("leading the torque would multiply the noise of the sensors"),
+    separated_by: "torque with most of its power above 30 Hz",
+    feedforward: Feedforward::Never("a lead compensation of the torque would amplify sensor noise"),
     declare: undeclared,
 };
 
 /// A torque constant, or its declared value, that is off.
 pub(super) static TORQUE_GAIN: EffectKind = EffectKind {
     id: "torque_gain",
-    summary: "the torque is another than the one that is asked for by a constant share",
+    summary: "error of the torque by a constant fraction of the torque command",
     place: Place::Actuator,
     machines: EVERYWHERE,
-    parameters: &[Parameter::amplitude("gain", [-0.9, 10.0], "share of the torque that is added to it")],
+    parameters: &[Parameter::amplitude("gain", [-0.9, 10.0], "relative error of the torque gain")],
     wave: None,
     trial: Trial::PLAIN.of(Signal::WantedTorque),
-    make_terms: |_, _| vec![Term::new("gain", |m: &Moment| Action::motor(m.torque_nm))],
-    separated_by: "a known payload, or a known weight on a lever",
+    make_terms: |_, _| vec![Term::new("gain", |m: &MotionSample| Action::motor(m.torque_nm))],
+    separated_by: "a known payload, or a known weight on a lever arm",
     feedforward: Feedforward::Causal,
     declare: undeclared,
 };
@@ -70,42 +72,42 @@ pub(super) static TORQUE_GAIN: EffectKind = EffectKind {
 /// A limit that the asker does not know of.
 pub(super) static TORQUE_SATURATION: EffectKind = EffectKind {
     id: "torque_saturation",
-    summary: "the torque is cut at a limit",
+    summary: "torque limited to a maximum",
     place: Place::Actuator,
     machines: EVERYWHERE,
     parameters: &[Parameter::shape("limit_nm", [1e-4, 1000.0], "largest torque")
         .linear("limit_n", [1e-3, 1e6])
-        .tried(Grid::OfTorque(&[0.5, 0.6, 0.7, 0.8, 0.9]), Step::Factor(1.08))],
+        .searched(Grid::OfTorque(&[0.5, 0.6, 0.7, 0.8, 0.9]), Step::Factor(1.08))],
     wave: None,
     trial: Trial::PLAIN.of(Signal::MeasuredTorque),
     make_terms: |_, shape| {
         let limit = shape[0];
         let cut = move |torque: f64| torque.clamp(-limit, limit);
-        vec![Term::fixed(move |m: &Moment| Action::motor(cut(m.torque_nm) - m.torque_nm))]
+        vec![Term::fixed(move |m: &MotionSample| Action::motor(cut(m.torque_nm) - m.torque_nm))]
     },
-    separated_by: "steps of rising size",
-    feedforward: Feedforward::Never("what is beyond the limit cannot be asked for"),
+    separated_by: "steps of increasing size",
+    feedforward: Feedforward::Never("torque beyond the limit is not available"),
     declare: undeclared,
 };
 
 /// Small torques that are lost.
 pub(super) static TORQUE_DEADZONE: EffectKind = EffectKind {
     id: "torque_deadzone",
-    summary: "of any torque a constant part is lost, and of a small one all of it",
+    summary: "dead zone: a constant part of the torque command has no effect",
     place: Place::Actuator,
     machines: EVERYWHERE,
-    parameters: &[Parameter::shape("width_nm", [0.0, 10.0], "torque up to which nothing acts")
+    parameters: &[Parameter::shape("width_nm", [0.0, 10.0], "half width of the dead zone")
         .linear("width_n", [0.0, 1e4])
-        .tried(Grid::Values(&[0.01, 0.02, 0.04, 0.08]), Step::Factor(1.4))],
+        .searched(Grid::Values(&[0.01, 0.02, 0.04, 0.08]), Step::Factor(1.4))],
     wave: None,
     trial: Trial::cautious(1.6).of(Signal::MeasuredTorque),
     make_terms: |_, shape| {
         let width = shape[0];
-        vec![Term::fixed(move |m: &Moment| Action::motor(-m.torque_nm.clamp(-width, width)))]
+        vec![Term::fixed(move |m: &MotionSample| Action::motor(-m.torque_nm.clamp(-width, width)))]
     },
     separated_by: "a slow triangle of torque about zero",
     feedforward: Feedforward::Never(
-        "its inverse jumps where the torque passes zero, and the motors would chatter there",
+        "its inverse is discontinuous at zero torque, where the motors would chatter",
     ),
     declare: undeclared,
 };
@@ -113,32 +115,32 @@ pub(super) static TORQUE_DEADZONE: EffectKind = EffectKind {
 /// Play between rotor and wheel.
 pub(super) static BACKLASH: EffectKind = EffectKind {
     id: "backlash",
-    summary: "no torque passes while the rotor crosses a gap after each reversal of the torque",
+    summary: "gap that transmits no torque while the rotor crosses it after each torque reversal",
     place: Place::Actuator,
     machines: EVERYWHERE,
     parameters: &[
         Parameter::shape("gap_rad", [0.0, 0.5], "angle of the gap")
             .linear("gap_m", [0.0, 0.05])
-            .tried(Grid::Values(&[0.005, 0.02, 0.06]), Step::Factor(1.6)),
+            .searched(Grid::Values(&[0.005, 0.02, 0.06]), Step::Factor(1.6)),
         Parameter::shape("rotor_inertia_kg_m2", [1e-8, 10.0], "inertia on the motor's side of the gap")
             .linear("rotor_mass_kg", [1e-4, 1e3])
-            .tried(Grid::OfWheelInertia(0.2), Step::Fixed),
+            .searched(Grid::OfWheelInertia(0.2), Step::Fixed),
     ],
     wave: None,
     trial: Trial::cautious(1.6).of(Signal::MeasuredTorque),
     make_terms: |_, shape| {
         let mut gap = Gap { width: shape[0], inertia: shape[1], place: None, speed: 0.0 };
-        vec![Term::fixed(move |m: &Moment| {
+        vec![Term::fixed(move |m: &MotionSample| {
             let lost = gap.share_of_time_free(m.torque_nm, m.dt_s);
             Action::motor(-lost * m.torque_nm)
         })]
     },
     separated_by: "a slow triangle of torque about zero, and an encoder on each side of the gap",
-    feedforward: Feedforward::Never("where the rotor is in its gap is not measured"),
+    feedforward: Feedforward::Never("the position of the rotor in its gap is not measured"),
     declare: undeclared,
 };
 
-/// What was asked for a fixed time ago.
+/// Torque command of a fixed time ago.
 #[derive(Clone)]
 struct DelayLine {
     delay_s: f64,
@@ -151,8 +153,8 @@ impl DelayLine {
         Self { delay_s, asked: VecDeque::new() }
     }
 
-    /// Mean of what acts until the next moment, where each torque is asked for from its moment to the next; what was
-    /// asked for before the first moment is taken to be the same as then.
+    /// Mean of what acts until the next moment, where each torque is requested from its moment to the next; what was
+    /// requested before the first moment is taken to be the same as then.
     fn delayed(&mut self, torque: f64, dt_s: f64) -> f64 {
         for (age_s, _) in &mut self.asked {
             *age_s += dt_s;
@@ -194,7 +196,7 @@ impl Lag {
     }
 }
 
-/// Where the rotor is in its gap.
+/// Position of the rotor in its gap.
 #[derive(Clone)]
 struct Gap {
     width: f64,
@@ -205,7 +207,7 @@ struct Gap {
 }
 
 impl Gap {
-    /// Share of the time until the next moment in which the rotor touches neither side.
+    /// Fraction of the time until the next moment in which the rotor touches neither side.
     fn share_of_time_free(&mut self, torque: f64, dt_s: f64) -> f64 {
         let end = if torque >= 0.0 { self.width } else { 0.0 };
         let place = self.place.unwrap_or(end);

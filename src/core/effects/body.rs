@@ -1,30 +1,34 @@
-//! What is in or on the body.
+//! Effects in or on the body.
 
 use std::f64::consts::TAU;
 
 use super::kind::{
     EffectKind, Feedforward, Form, Grid, NOT_INSIDE, Parameter, Place, Step, Trial, undeclared,
 };
-use super::law::{Action, Moment, Term};
-use super::machine::MachineKind;
+use super::law::{Action, MotionSample, Term};
+use crate::model::MachineKind;
 
 const ROBOT: &[MachineKind] = &[MachineKind::Robot];
 
-/// A centre of mass beside the line that the IMU calls upright.
+/// A centre of mass next to the line that the IMU calls upright.
 pub(super) static PITCH_OFFSET: EffectKind = EffectKind {
     id: "pitch_offset",
-    summary: "centre of mass in front of the axle while the IMU says upright, or an IMU that is tilted backward",
+    summary: "centre of mass in front of the axle at zero pitch reading, or an IMU tilted backward",
     place: Place::Pitch,
     machines: ROBOT,
-    parameters: &[Parameter::amplitude("angle_rad", [-0.5, 0.5], "angle by which it is in front")],
+    parameters: &[Parameter::amplitude(
+        "angle_rad",
+        [-0.5, 0.5],
+        "angle of the centre of mass in front of the axle",
+    )],
     wave: None,
     trial: Trial::PLAIN,
     make_terms: |machine, _| {
         let p = machine.parameters;
         let weight_nm = p.body_mass_kg * p.gravity_m_s2 * p.com_height_m;
-        vec![Term::new("angle_rad", move |m: &Moment| Action::body(weight_nm * libm::cos(m.pitch_rad)))]
+        vec![Term::new("angle_rad", move |m: &MotionSample| Action::body(weight_nm * libm::cos(m.pitch_rad)))]
     },
-    separated_by: "a second height of the legs, or the body on a plumb line",
+    separated_by: "a second leg height, or the body on a plumb line",
     feedforward: NOT_INSIDE,
     declare: undeclared,
 };
@@ -32,31 +36,31 @@ pub(super) static PITCH_OFFSET: EffectKind = EffectKind {
 /// A leg, body or coupling that is not stiff.
 pub(super) static STRUCTURAL_MODE: EffectKind = EffectKind {
     id: "structural_mode",
-    summary: "a part on a spring that follows the torque up to its resonance and stays behind above it",
+    summary: "flexible part that follows the torque up to its resonance and lags above it",
     place: Place::Pitch,
     machines: &[MachineKind::Robot, MachineKind::Rotary, MachineKind::Linear],
     parameters: &[
-        Parameter::shape("frequency_hz", [0.5, 500.0], "its resonance")
-            .tried(Grid::Geometric(2.5, 1.14, 14), Step::Factor(1.07)),
-        Parameter::shape("damping_ratio", [1e-3, 0.99], "its damping as a share of the critical one")
-            .tried(Grid::Values(&[0.04]), Step::Factor(1.6)),
-        Parameter::amplitude("share", [-2.0, 2.0], "share of the torque that it takes").opposing(),
+        Parameter::shape("frequency_hz", [0.5, 500.0], "resonance frequency")
+            .searched(Grid::Geometric(2.5, 1.14, 14), Step::Factor(1.07)),
+        Parameter::shape("damping_ratio", [1e-3, 0.99], "damping ratio")
+            .searched(Grid::Values(&[0.04]), Step::Factor(1.6)),
+        Parameter::amplitude("fraction", [-2.0, 2.0], "fraction of the torque that drives it").opposing(),
     ],
     wave: None,
     trial: Trial { repeats: true, forms: &[Form::Law, Form::Driven], ..Trial::cautious(6.0) },
     make_terms: |machine, shape| {
         let mut mode = Oscillator::new(shape[0], shape[1]);
         let on_robot = machine.kind == MachineKind::Robot;
-        vec![Term::remembering("share", move |m: &Moment| {
+        vec![Term::remembering("fraction", move |m: &MotionSample| {
             // On a robot the motors' reaction drives the body.
             let torque = if on_robot { -m.torque_sum_nm } else { m.torque_nm };
             let late = mode.advance(torque, m.dt_s) - torque;
             if on_robot { Action::body(late) } else { Action::motor(late) }
         })]
     },
-    separated_by: "torque that sweeps slowly through the frequencies; a second height of the legs",
+    separated_by: "a slow sine sweep of the torque; a second leg height",
     feedforward: Feedforward::Never(
-        "its phase turns over at the resonance, where a torque for it would feed it",
+        "its phase reverses at the resonance, where a feedforward torque would excite it",
     ),
     declare: undeclared,
 };
@@ -64,18 +68,18 @@ pub(super) static STRUCTURAL_MODE: EffectKind = EffectKind {
 /// Liquid in a tank, or a part that swings.
 pub(super) static SLOSH: EffectKind = EffectKind {
     id: "slosh",
-    summary: "a part of the body's mass on a spring that lags behind the body's motion",
+    summary: "part of the body's mass on a spring that lags behind the motion of the body",
     place: Place::Translation,
     machines: ROBOT,
     parameters: &[
-        Parameter::shape("frequency_hz", [0.1, 50.0], "its resonance")
-            .tried(Grid::Geometric(0.5, 1.16, 14), Step::Factor(1.08)),
-        Parameter::shape("damping_ratio", [1e-3, 0.99], "its damping as a share of the critical one")
-            .tried(Grid::Values(&[0.05]), Step::Factor(1.6)),
-        Parameter::shape("height_m", [-1.0, 3.0], "its height above the axle along the body")
+        Parameter::shape("frequency_hz", [0.1, 50.0], "resonance frequency")
+            .searched(Grid::Geometric(0.5, 1.16, 14), Step::Factor(1.08)),
+        Parameter::shape("damping_ratio", [1e-3, 0.99], "damping ratio")
+            .searched(Grid::Values(&[0.05]), Step::Factor(1.6)),
+        Parameter::shape("height_m", [-1.0, 3.0], "height above the axle along the body")
             .or(0.0)
-            .tried(Grid::OfHeight(&[1.0]), Step::OfHeight(0.3)),
-        Parameter::amplitude("mass_kg", [0.0, 100.0], "how much of the declared mass moves"),
+            .searched(Grid::OfHeight(&[1.0]), Step::OfHeight(0.3)),
+        Parameter::amplitude("mass_kg", [0.0, 100.0], "moving part of the declared mass"),
     ],
     wave: None,
     trial: Trial::PLAIN,
@@ -83,7 +87,7 @@ pub(super) static SLOSH: EffectKind = EffectKind {
         let mut mass = Oscillator::new(shape[0], shape[1]);
         let (stiffness, height_m, gravity) =
             (mass.omega * mass.omega, shape[2], machine.parameters.gravity_m_s2);
-        vec![Term::remembering("mass_kg", move |m: &Moment| {
+        vec![Term::remembering("mass_kg", move |m: &MotionSample| {
             // Driven by the acceleration of its place, against which it moves by s: s̈ = −a − 2ζω ṡ − ω² s.
             let driven = m.x_accel_m_s2 + height_m * m.pitch_accel_rad_s2;
             let place = mass.advance(-driven / stiffness, m.dt_s);
@@ -92,8 +96,8 @@ pub(super) static SLOSH: EffectKind = EffectKind {
             Action { body_nm: force.body_nm + gravity * place, ..force }
         })]
     },
-    separated_by: "a push that is waited out, with the tank full, half full and empty",
-    feedforward: Feedforward::Never("where the moving mass is remembers the past and is not measured"),
+    separated_by: "the decay after a push, with the tank full, half full and empty",
+    feedforward: Feedforward::Never("the state of the moving mass is not measured"),
     declare: undeclared,
 };
 

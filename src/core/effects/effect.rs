@@ -4,28 +4,18 @@ use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
 
 use super::kind::{Declared, EffectKind, Feedforward, Parameter, Role};
-use super::law::{Action, Law, Moment, Term};
-use super::machine::{Machine, MachineKind};
+use super::law::{Action, Law, MotionSample, Term};
+use super::machine::Machine;
 use super::{KINDS, kind};
-use crate::robot::Motor;
-
-/// An effect as in `[[effects]]` of a model file; its parameters have been checked.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Effect {
-    kind: &'static EffectKind,
-    motor: Option<Motor>,
-    parameters: Vec<(String, f64)>,
-    /// Whether a controller may cancel it, where its kind can be.
-    fed: bool,
-}
+use crate::model::{Effect, MachineKind, Motor};
 
 /// A value of an effect that the library refuses.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{problem}")]
 pub struct EffectError {
-    /// Key of the refused value; none where one is missing.
+    /// Key of the refused value; `None` if one is missing.
     pub key: Option<String>,
-    /// What is wrong, and the mend.
+    /// What is wrong and how to fix it.
     pub problem: String,
 }
 
@@ -42,6 +32,16 @@ impl Effect {
     /// # Errors
     /// An id, motor or key that the library does not know on such a machine, a parameter that is missing, and a value
     /// outside of its physical range.
+    ///
+    /// ```
+    /// use flqr_core::model::{Effect, MachineKind, Motor};
+    ///
+    /// let parameters = [("order_1", 7.0), ("cos_1_nm", 0.05), ("sin_1_nm", 0.03)];
+    /// let cogging = Effect::new("cogging", MachineKind::Robot, Some(Motor::Left), parameters)?;
+    /// assert_eq!(cogging.get("cos_1_nm"), Some(0.05));
+    /// assert!(Effect::new("cogging", MachineKind::Robot, None, [("order_1", 7.0)]).is_err()); // no amplitude
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn new<K: AsRef<str>>(
         id: &str,
         machine: MachineKind,
@@ -67,13 +67,13 @@ impl Effect {
         for (key, parameter) in allowed {
             let value = given.iter().find(|(name, _)| name.as_ref() == key).map(|&(_, value)| value);
             let Some(value) = value.or(parameter.default) else {
-                let problem = format!("{id} lacks {key} ({}): add it", parameter.meaning);
+                let problem = format!("{id} lacks {key} ({}): add it", parameter.description);
                 return Err(EffectError { key: None, problem });
             };
             check(id, &key, parameter, machine, value)?;
             parameters.push((key, value));
         }
-        Ok(Self { kind, motor, parameters, fed: true })
+        Ok(Self { id: kind.id, motor, parameters, fed: true })
     }
 
     /// The effect of an estimate: shape parameters as [`EffectKind::terms`] takes them, and the amplitudes in the order
@@ -98,19 +98,19 @@ impl Effect {
         }
         if shapes.next().or(sizes.next()).is_some() {
             let problem =
-                format!("{} has no place for all of the values: give one for each parameter", kind.id);
+                format!("{} has fewer parameters than values: give one value per parameter", kind.id);
             return Err(EffectError { key: None, problem });
         }
         Self::new(kind.id, machine, motor, values)
     }
 
-    /// What it is on a shaft whose angles count from elsewhere: at an angle q as this one at q + `turn_rad`. The same for
-    /// one that does not return with every turn.
+    /// Returns the effect for a shaft with an angle offset: at an angle q as this one at q + `turn_rad`. The same
+    /// for one that does not return with every turn.
     #[must_use]
     pub fn turned(&self, turn_rad: f64) -> Self {
         let mut turned = self.clone();
-        if self.kind.series() {
-            for member in turned.parameters.chunks_exact_mut(self.kind.parameters.len()) {
+        if self.kind().series() {
+            for member in turned.parameters.chunks_exact_mut(self.kind().parameters.len()) {
                 let [(_, order), (_, cos), (_, sin)] = member else { continue };
                 let (s, c) = (*order * turn_rad).sin_cos();
                 (*cos, *sin) = (*cos * c + *sin * s, *sin * c - *cos * s);
@@ -119,73 +119,53 @@ impl Effect {
         turned
     }
 
-    /// What the library knows of its kind.
+    /// Returns its kind.
     pub fn kind(&self) -> &'static EffectKind {
-        self.kind
+        kind(self.id).expect("an effect is only made of a kind of the library")
     }
 
-    /// Its name.
-    pub fn id(&self) -> &'static str {
-        self.kind.id
-    }
-
-    /// The same for controllers to cancel, or to leave as it is (`feedforward = false` in a model file). The simulator
+    /// Returns it with feedforward enabled or disabled (`feedforward = false` in a model file). The simulator
     /// has it either way.
     ///
     /// # Errors
     /// One that no controller can cancel.
     pub fn with_feedforward(self, fed: bool) -> Result<Self, EffectError> {
-        match self.kind.feedforward {
+        match self.kind().feedforward {
             Feedforward::Never(reason) if fed => {
-                let problem = format!("{} cannot be fed forward ({reason}): remove the key", self.kind.id);
+                let problem = format!("{} cannot be fed forward ({reason}): remove the key", self.kind().id);
                 Err(EffectError::at("feedforward", problem))
             }
             _ => Ok(Self { fed, ..self }),
         }
     }
 
-    /// Whether a controller cancels it.
+    /// Returns whether a controller cancels it.
     pub fn is_fed_forward(&self) -> bool {
-        self.fed && self.kind.feedforward == Feedforward::Causal
-    }
-
-    /// The motor that it is in; none for both, and for effects that are in no motor.
-    pub fn motor(&self) -> Option<Motor> {
-        self.motor
-    }
-
-    /// Keys, units included, and values, in the order of the model file.
-    pub fn parameters(&self) -> &[(String, f64)] {
-        &self.parameters
-    }
-
-    /// A parameter's value; none for a key that it does not have.
-    pub fn get(&self, key: &str) -> Option<f64> {
-        self.parameters.iter().find(|(name, _)| name == key).map(|&(_, value)| value)
+        self.fed && self.kind().feedforward == Feedforward::Causal
     }
 
     /// Values of one role in their order.
     pub fn values(&self, role: Role) -> Vec<f64> {
-        let own = |at: usize| &self.kind.parameters[at % self.kind.parameters.len()];
+        let own = |at: usize| &self.kind().parameters[at % self.kind().parameters.len()];
         let of_role = |&(at, _): &(usize, &(String, f64))| own(at).role == role;
         self.parameters.iter().enumerate().filter(of_role).map(|(_, &(_, value))| value).collect()
     }
 
-    /// Whether it is in a motor of a robot.
+    /// Returns whether it is in a motor of a robot.
     pub fn is_in(&self, motor: Motor) -> bool {
-        self.kind.per_motor() && self.motor.is_none_or(|own| own == motor)
+        self.kind().per_motor() && self.motor.is_none_or(|own| own == motor)
     }
 
     /// Its law on a machine: the sum of its terms, each times its amplitude.
     pub fn law(&self, machine: &Machine) -> EffectLaw {
         let amplitude = |term: &Term| term.amplitude.as_ref().map_or(1.0, |key| self.get(key).unwrap_or(0.0));
-        let terms = self.kind.terms(machine, &self.values(Role::Shape));
+        let terms = self.kind().terms(machine, &self.values(Role::Shape));
         EffectLaw { terms: terms.into_iter().map(|term| (amplitude(&term), term.law)).collect() }
     }
 
     /// Writes it into a model's declared numbers, and says whether they hold all of it.
     pub fn declare_in(&self, model: Declared<'_>) -> bool {
-        (self.kind.declare)(self, model)
+        (self.kind().declare)(self, model)
     }
 }
 
@@ -196,7 +176,7 @@ pub struct EffectLaw {
 }
 
 impl Law for EffectLaw {
-    fn act(&mut self, moment: &Moment) -> Action {
+    fn act(&mut self, moment: &MotionSample) -> Action {
         let mut sum = Action::default();
         for (amplitude, law) in &mut self.terms {
             sum = sum.plus(*amplitude, &law.act(moment));
@@ -204,7 +184,7 @@ impl Law for EffectLaw {
         sum
     }
 
-    fn at(&self, moment: &Moment) -> Option<Action> {
+    fn at(&self, moment: &MotionSample) -> Option<Action> {
         let add = |sum: Action, (amplitude, law): &(f64, Box<dyn Law>)| {
             Some(sum.plus(*amplitude, &law.at(moment)?))
         };
@@ -248,14 +228,14 @@ fn kind_on(id: &str, machine: MachineKind) -> Result<&'static EffectKind, Effect
         ids.join(", ")
     };
     match kind(id) {
-        None => refused(format!("there is no effect {id}: use one of {}", known())),
+        None => refused(format!("unknown effect {id}: use one of {}", known())),
         Some(kind) if !kind.is_on(machine) => {
             let machine = match machine {
                 MachineKind::Robot => "a robot",
                 MachineKind::Rotary => "a rotary axis",
                 MachineKind::Linear => "a linear axis",
             };
-            refused(format!("{id} cannot be on {machine}: use one of {}", known()))
+            refused(format!("{id} does not apply to {machine}: use one of {}", known()))
         }
         Some(kind) => Ok(kind),
     }

@@ -1,10 +1,11 @@
 //! The torque that cancels the effects inside a motor.
 
-use super::effect::{Effect, EffectLaw};
-use super::law::{Action, Law, Moment};
+use super::effect::EffectLaw;
+use super::law::{Action, Law, MotionSample};
 use super::machine::Machine;
 use crate::friction::Compensation;
-use crate::robot::Motor;
+use crate::model::Effect;
+use crate::model::Motor;
 
 /// Most secants in which a torque is found that cancels what depends on itself. For effects in proportion to the torque
 /// one is enough.
@@ -27,8 +28,8 @@ impl PartialEq for EffectFeedforward {
 }
 
 impl EffectFeedforward {
-    /// The feedforward of those effects that are causal and not kept from it; none where no effect is. Of dry friction the compensation's
-    /// share is fed forward, with its direction smoothed as that of the declared curve.
+    /// The feedforward of those effects that are causal and not kept from it; `None` if no effect is. Of dry
+    /// friction the compensation's share is fed forward, with its direction smoothed as that of the declared curve.
     pub fn new(machine: &Machine, effects: &[Effect], compensation: Compensation) -> Option<Self> {
         let causal = |effect: &&Effect| effect.is_fed_forward() && effect.kind().per_motor();
         let effects: Vec<Effect> = effects.iter().filter(causal).cloned().collect();
@@ -45,7 +46,7 @@ impl EffectFeedforward {
         &self.effects
     }
 
-    /// The same without the effects that depend on the rotor's own angle; none where nothing is left.
+    /// Returns it without the effects that depend on the rotor angle; `None` if none remain.
     pub fn without_rotor_angle(&self) -> Option<Self> {
         let left = |effect: &Effect| !effect.kind().by_angle();
         let [effects_left, all] = [self.effects.iter().filter(|e| left(e)).count(), self.effects.len()];
@@ -64,7 +65,7 @@ impl EffectFeedforward {
 
     /// The torque to ask of a motor so that `torque_nm` comes out of it, N m. Of the moment angle and speed of the
     /// motor are used.
-    pub fn asked_nm(&self, motor: Motor, moment: &Moment, torque_nm: f64) -> f64 {
+    pub fn asked_nm(&self, motor: Motor, moment: &MotionSample, torque_nm: f64) -> f64 {
         let laws = &self.motors[motor as usize];
         if laws.is_empty() {
             return torque_nm;
@@ -72,7 +73,7 @@ impl EffectFeedforward {
         let smoothed = libm::tanh(moment.motor_speed_rad_s / self.compensation.smoothing_speed_rad_s);
         let direction = self.compensation.ratio * smoothed;
         let excess = |asked: f64| {
-            let moment = Moment { torque_nm: asked, ..*moment };
+            let moment = MotionSample { torque_nm: asked, ..*moment };
             let act = |law: &EffectLaw| law.at(&moment).expect("a causal effect has no memory");
             let sum = laws.iter().fold(Action::default(), |sum, law| sum.plus(1.0, &act(law)));
             asked + sum.on_motor_nm(direction) - torque_nm

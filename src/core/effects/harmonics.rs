@@ -3,8 +3,9 @@
 use std::f64::consts::TAU;
 
 use super::kind::{EffectKind, Feedforward, Grid, Parameter, Place, Signal, Step, Trial, undeclared};
-use super::law::{Action, Moment, Term};
-use super::machine::{Machine, MachineKind};
+use super::law::{Action, MotionSample, Term};
+use super::machine::Machine;
+use crate::model::MachineKind;
 
 /// Orders up to 20,000, of fine encoders' errors; on a linear axis periods from 10 µm to 10 m.
 const ORDER: Parameter = Parameter::shape("order_#", [1.0, 20_000.0], "cycles per turn")
@@ -12,14 +13,14 @@ const ORDER: Parameter = Parameter::shape("order_#", [1.0, 20_000.0], "cycles pe
     .linear("period_#_m", [1e-5, 10.0]);
 /// Orders that are tried.
 const fn orders(most: u32) -> Parameter {
-    ORDER.tried(Grid::Orders(most), Step::Fixed)
+    ORDER.searched(Grid::Orders(most), Step::Fixed)
 }
 
 /// Torque that depends on the rotor's angle: magnets that prefer some of the stator's teeth, errors of the current's
 /// phase at a constant current, a joint that runs unevenly.
 pub(super) static COGGING: EffectKind = EffectKind {
     id: "cogging",
-    summary: "torque that depends on the motor's angle: Σ cos cos(order q) + sin sin(order q)",
+    summary: "torque as a function of the motor angle: Σ cos cos(order q) + sin sin(order q)",
     place: Place::Motor,
     machines: &[MachineKind::Robot, MachineKind::Rotary, MachineKind::Linear],
     parameters: &[
@@ -32,7 +33,7 @@ pub(super) static COGGING: EffectKind = EffectKind {
     make_terms: |machine, shape| {
         harmonics(machine, shape, ["cos_#_nm", "sin_#_nm"], ["cos_#_n", "sin_#_n"], cogging)
     },
-    separated_by: "slow turns in both directions, some turns each, with the wheel in the air",
+    separated_by: "several slow turns in each direction, with the wheel in the air",
     feedforward: Feedforward::Causal,
     declare: undeclared,
 };
@@ -40,13 +41,13 @@ pub(super) static COGGING: EffectKind = EffectKind {
 /// Torque constant that depends on the rotor's angle.
 pub(super) static TORQUE_RIPPLE: EffectKind = EffectKind {
     id: "torque_ripple",
-    summary: "torque constant that depends on the motor's angle: T Σ cos cos(order q) + sin sin(order q)",
+    summary: "torque constant as a function of the motor angle: T Σ cos cos(order q) + sin sin(order q)",
     place: Place::Motor,
     machines: &[MachineKind::Robot, MachineKind::Rotary, MachineKind::Linear],
     parameters: &[
         orders(40),
-        Parameter::amplitude("cos_#", [-1.0, 1.0], "cosine part as a share of the torque"),
-        Parameter::amplitude("sin_#", [-1.0, 1.0], "sine part as a share of the torque"),
+        Parameter::amplitude("cos_#", [-1.0, 1.0], "cosine part relative to the torque"),
+        Parameter::amplitude("sin_#", [-1.0, 1.0], "sine part relative to the torque"),
     ],
     wave: Some(ripple),
     trial: Trial::PLAIN.of(Signal::MeasuredTorque),
@@ -54,7 +55,7 @@ pub(super) static TORQUE_RIPPLE: EffectKind = EffectKind {
         let keys = ["cos_#", "sin_#"];
         harmonics(machine, shape, keys, keys, ripple)
     },
-    separated_by: "two levels of torque at one speed",
+    separated_by: "two torques at one speed",
     feedforward: Feedforward::Causal,
     declare: undeclared,
 };
@@ -62,7 +63,7 @@ pub(super) static TORQUE_RIPPLE: EffectKind = EffectKind {
 /// Dry friction that depends on the angle.
 pub(super) static POSITION_DEPENDENT_FRICTION: EffectKind = EffectKind {
     id: "position_dependent_friction",
-    summary: "level of dry friction that depends on the motor's angle: Σ cos cos(order q) + sin sin(order q)",
+    summary: "dry friction as a function of the motor angle: Σ cos cos(order q) + sin sin(order q)",
     place: Place::Motor,
     machines: &[MachineKind::Robot, MachineKind::Rotary, MachineKind::Linear],
     parameters: &[
@@ -75,20 +76,20 @@ pub(super) static POSITION_DEPENDENT_FRICTION: EffectKind = EffectKind {
     make_terms: |machine, shape| {
         harmonics(machine, shape, ["cos_#_nm", "sin_#_nm"], ["cos_#_n", "sin_#_n"], friction)
     },
-    separated_by: "slow turns in both directions: friction changes its sign with the direction, cogging does not",
+    separated_by: "slow turns in both directions: friction changes sign with the direction, cogging does not",
     feedforward: Feedforward::Causal,
     declare: undeclared,
 };
 
-fn cogging(wave: f64, _: &Moment) -> Action {
+fn cogging(wave: f64, _: &MotionSample) -> Action {
     Action::motor(wave)
 }
 
-fn ripple(wave: f64, moment: &Moment) -> Action {
+fn ripple(wave: f64, moment: &MotionSample) -> Action {
     Action::motor(wave * moment.torque_nm)
 }
 
-fn friction(wave: f64, _: &Moment) -> Action {
+fn friction(wave: f64, _: &MotionSample) -> Action {
     Action::friction(wave)
 }
 
@@ -98,7 +99,7 @@ fn harmonics(
     shape: &[f64],
     keys: [&str; 2],
     linear_keys: [&str; 2],
-    action: fn(f64, &Moment) -> Action,
+    action: fn(f64, &MotionSample) -> Action,
 ) -> Vec<Term> {
     let linear = machine.kind == MachineKind::Linear;
     let keys = if linear { linear_keys } else { keys };
@@ -106,8 +107,12 @@ fn harmonics(
     for (&shape, number) in shape.iter().zip(1..) {
         let per_angle = if linear { TAU / shape } else { shape };
         let [cos, sin] = keys.map(|key| key.replace('#', &number.to_string()));
-        terms.push(Term::new(cos, move |m: &Moment| action(libm::cos(per_angle * m.motor_angle_rad), m)));
-        terms.push(Term::new(sin, move |m: &Moment| action(libm::sin(per_angle * m.motor_angle_rad), m)));
+        terms.push(Term::new(cos, move |m: &MotionSample| {
+            action(libm::cos(per_angle * m.motor_angle_rad), m)
+        }));
+        terms.push(Term::new(sin, move |m: &MotionSample| {
+            action(libm::sin(per_angle * m.motor_angle_rad), m)
+        }));
     }
     terms
 }

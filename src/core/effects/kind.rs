@@ -1,11 +1,12 @@
-//! What the library knows of a kind of effect.
+//! Kinds of effects.
 
-use super::effect::Effect;
-use super::law::{Action, Moment, Term};
-use super::machine::{Machine, MachineKind};
-use crate::model_file::{AxisModel, RobotModel};
+use super::law::{Action, MotionSample, Term};
+use super::machine::Machine;
+use crate::model::Effect;
+use crate::model::MachineKind;
+use crate::model::{AxisModel, RobotModel};
 
-/// Where an effect sits.
+/// Location of an effect in the model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
     /// Torque inside one motor.
@@ -14,31 +15,31 @@ pub enum Place {
     Translation,
     /// Torque on the body.
     Pitch,
-    /// Between the torque that is asked for and the one on the shaft.
+    /// Between the commanded torque and the shaft torque.
     Actuator,
-    /// In what the sensors say.
+    /// Sensors.
     Sensor,
-    /// In a declared number.
+    /// Declared parameter.
     Parameter,
 }
 
-/// Whether a controller can cancel an effect.
+/// True if a controller can cancel an effect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Feedforward {
-    /// From what is measured now.
+    /// From current measurements.
     Causal,
-    /// By the corrected number, which the controller uses anyway.
+    /// By the corrected parameter, which the controller uses.
     Declared,
-    /// Not; with the reason.
+    /// Impossible, with the reason.
     Never(&'static str),
 }
 
-/// How a parameter enters.
+/// Role of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
-    /// Not linearly: an order, a delay, a time constant, a knee, a speed scale.
+    /// Nonlinear: an order, a delay, a time constant, a knee, a speed scale.
     Shape,
-    /// Linearly: the factor of a term.
+    /// Linear: the factor of a term.
     Amplitude,
 }
 
@@ -47,24 +48,24 @@ pub enum Role {
 pub struct Parameter {
     /// Key as in the model file, unit included, on a robot and on a rotary axis.
     key: &'static str,
-    /// The same on a linear axis.
+    /// Key on a linear axis.
     linear_key: &'static str,
-    /// What it is.
-    pub meaning: &'static str,
-    /// How it enters.
+    /// Description.
+    pub description: &'static str,
+    /// Role.
     pub role: Role,
     /// Lowest and highest value that a machine can have, on a robot and on a rotary axis.
     range: [f64; 2],
     linear_range: [f64; 2],
-    /// Value where a model file leaves it out; none where it has to be given.
+    /// Value where a model file leaves it out; `None` if it is required.
     pub default: Option<f64>,
-    /// Whether it is a whole number on a robot and on a rotary axis.
+    /// True if it is a whole number on a robot and on a rotary axis.
     pub whole: bool,
-    /// Whether it is against the motion, or pulls back: such an amplitude is not below 0.
+    /// True if it is against the motion, or pulls back: such an amplitude is not below 0.
     pub opposing: bool,
-    /// Whether the effect is nearly in proportion to it, though it is a shape.
+    /// True if the effect is nearly in proportion to it, though it is a shape.
     pub sized: bool,
-    /// Where a search for the effect begins, and how it goes on from there.
+    /// Initial values of a search.
     pub grid: Grid,
     /// See `grid`.
     pub step: Step,
@@ -75,25 +76,25 @@ pub struct Parameter {
 pub enum Grid {
     /// Its default; nowhere without one.
     Default,
-    /// Whole numbers from 1 up to this one, as far as they can be told at the speeds of a log.
+    /// Integers from 1 up to this one, as far as the speeds of a log resolve them.
     Orders(u32),
     /// These.
     Values(&'static [f64]),
-    /// From this one by this factor, so many.
+    /// Geometric sequence: first value, factor, count.
     Geometric(f64, f64, u32),
-    /// Shares of the length of the log.
+    /// Fractions of the length of the log.
     OfLog(&'static [f64]),
-    /// Shares of the largest torque in the log.
+    /// Fractions of the largest torque in the log.
     OfTorque(&'static [f64]),
-    /// Shares of the height of the centre of mass.
+    /// Fractions of the height of the centre of mass.
     OfHeight(&'static [f64]),
-    /// A share of the inertia of a wheel.
+    /// Fraction of the inertia of a wheel.
     OfWheelInertia(f64),
-    /// Places along the way, as far apart as the next parameter says.
-    Way,
+    /// Positions along the distance travelled, spaced by the next parameter.
+    Distance,
 }
 
-/// How a search refines a shape parameter.
+/// Refinement of a shape parameter in a search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Step {
     /// Not.
@@ -102,67 +103,67 @@ pub enum Step {
     Factor(f64),
     /// By a sum.
     Sum(f64),
-    /// By a share of the height of the centre of mass.
+    /// By a fraction of the height of the centre of mass.
     OfHeight(f64),
-    /// By a share of the next parameter.
+    /// By a fraction of the next parameter.
     OfNext(f64),
 }
 
-/// How an effect enters the equations of a robot, where there is more than one way.
+/// Form of an effect in the equations of a robot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
     /// As its law says.
     Law,
     /// Only where the motors turn forward: half of it, and half of the error of the same in both directions.
     Forward(&'static EffectKind),
-    /// A mode of the body that its own turning drives.
+    /// Mode of the body excited by its rotation.
     Driven,
-    /// Waves of the ground, a row of bumps: their length is the second shape parameter.
+    /// Periodic ground (a row of bumps) with the second shape parameter as wavelength.
     Wave,
-    /// The log read with an IMU that speaks late.
+    /// Log with delayed IMU readings.
     Late,
 }
 
-/// What the column of an effect is made of, on a log of one motor or axis.
+/// Signal that the column of an effect is computed from, on a log of one motor or axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Signal {
     /// The speed alone.
     Speed,
     /// The acceleration, and its noise.
     Acceleration,
-    /// The torque as it was measured, which then explains itself.
+    /// Measured torque, which then explains itself.
     MeasuredTorque,
-    /// The torque that the model wants: a scale of the measured one that is off.
+    /// Torque of the model, for a scale error of the measured torque.
     WantedTorque,
     /// Anything else: position, direction, time.
     Other,
 }
 
-/// How a search over logs goes about an effect.
+/// Search settings of an effect.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trial {
-    /// Evidence that it needs, in units of what a plain effect does: what else is easily taken for it.
+    /// Required significance relative to a plain effect; larger for effects that others are easily mistaken for.
     pub caution: f64,
-    /// Whether a machine can have several, each of a shape of its own; those of a series can anyway.
+    /// True if a machine can have several, each of a separate shape; those of a series can anyway.
     pub repeats: bool,
-    /// Whether it is there for a moment only, of which no other part of a log tells.
+    /// True if it is there for a moment only, of which no other part of a log tells.
     pub brief: bool,
-    /// Ways to enter.
+    /// Forms in the equations.
     pub forms: &'static [Form],
-    /// What its column is made of.
+    /// Signal that its column is computed from.
     pub signal: Signal,
 }
 
 impl Trial {
-    /// Of an effect without anything special.
+    /// Settings of an ordinary effect.
     pub(super) const PLAIN: Self =
         Self { caution: 1.0, repeats: false, brief: false, forms: &[Form::Law], signal: Signal::Other };
-    /// Of one that noise and what is next to it easily look like.
+    /// Settings of an effect that is easily mimicked by noise or other effects.
     pub(super) const fn cautious(caution: f64) -> Self {
         Self { caution, ..Self::PLAIN }
     }
 
-    /// Of one whose column is made of this.
+    /// Sets the signal of its column.
     pub(super) const fn of(self, signal: Signal) -> Self {
         Self { signal, ..self }
     }
@@ -170,11 +171,11 @@ impl Trial {
 
 impl Parameter {
     /// A shape parameter from `lowest` to `highest`.
-    pub(super) const fn shape(key: &'static str, range: [f64; 2], meaning: &'static str) -> Self {
+    pub(super) const fn shape(key: &'static str, range: [f64; 2], description: &'static str) -> Self {
         Self {
             key,
             linear_key: key,
-            meaning,
+            description,
             role: Role::Shape,
             range,
             linear_range: range,
@@ -188,36 +189,36 @@ impl Parameter {
     }
 
     /// An amplitude from `lowest` to `highest`.
-    pub(super) const fn amplitude(key: &'static str, range: [f64; 2], meaning: &'static str) -> Self {
-        Self { role: Role::Amplitude, ..Self::shape(key, range, meaning) }
+    pub(super) const fn amplitude(key: &'static str, range: [f64; 2], description: &'static str) -> Self {
+        Self { role: Role::Amplitude, ..Self::shape(key, range, description) }
     }
 
-    /// On a linear axis under another key, because of another unit, in another range.
+    /// Sets key and range on a linear axis.
     pub(super) const fn linear(self, linear_key: &'static str, linear_range: [f64; 2]) -> Self {
         Self { linear_key, linear_range, ..self }
     }
 
-    /// May be left out.
+    /// Sets a default.
     pub(super) const fn or(self, default: f64) -> Self {
         Self { default: Some(default), ..self }
     }
 
-    /// Is not below 0 in a search.
+    /// Restricts it to values of 0 or above in a search.
     pub(super) const fn opposing(self) -> Self {
         Self { opposing: true, ..self }
     }
 
-    /// Is nearly in proportion to the effect.
+    /// Marks it as nearly proportional to the effect.
     pub(super) const fn sized(self) -> Self {
         Self { sized: true, ..self }
     }
 
-    /// Is searched for from these values on.
-    pub(super) const fn tried(self, grid: Grid, step: Step) -> Self {
+    /// Sets the initial values and the refinement of a search.
+    pub(super) const fn searched(self, grid: Grid, step: Step) -> Self {
         Self { grid, step, ..self }
     }
 
-    /// Is a whole number.
+    /// Restricts it to integers.
     pub(super) const fn whole(self) -> Self {
         Self { whole: true, ..self }
     }
@@ -282,24 +283,24 @@ pub fn name_and_unit(key: &str) -> (&str, &'static str) {
 pub struct EffectKind {
     /// Its name in model files and reports.
     pub id: &'static str,
-    /// What it is, in one sentence.
+    /// Description in one sentence.
     pub summary: &'static str,
-    /// Where it sits.
+    /// Location in the model.
     pub place: Place,
     /// Machines that it can be on.
     pub machines: &'static [MachineKind],
     /// Parameters in the order of the model file: of a series those of its first member.
     pub parameters: &'static [Parameter],
-    /// What a wave of the machine's angle does at a moment, in proportion to it; of a series of harmonics, whose
+    /// Action of a harmonic of the machine's angle per unit amplitude; of a series of harmonics, whose
     /// parameters repeat, numbered from 1.
-    pub wave: Option<fn(f64, &Moment) -> Action>,
-    /// How a search goes about it.
+    pub wave: Option<fn(f64, &MotionSample) -> Action>,
+    /// Search settings.
     pub trial: Trial,
     /// Its terms on a machine at shape parameters, which stand in the order of the parameters.
     pub(super) make_terms: fn(&Machine, &[f64]) -> Vec<Term>,
     /// The experiment that tells it from the others that look alike.
     pub separated_by: &'static str,
-    /// Whether a controller can cancel it.
+    /// True if a controller can cancel it.
     pub feedforward: Feedforward,
     /// Writes it into the model's declared numbers, and says whether they hold all of it.
     pub(super) declare: fn(&Effect, Declared<'_>) -> bool,
@@ -316,7 +317,7 @@ pub enum Declared<'a> {
 
 /// Forces from outside and torques on the body.
 pub(super) const NOT_INSIDE: Feedforward = Feedforward::Never(
-    "a torque of the motors acts back on the body and cannot cancel it: the robot has to lean against it",
+    "a motor torque reacts on the body and cannot cancel it: the robot has to lean against it",
 );
 
 /// No number of a model can hold such an effect.
@@ -325,32 +326,32 @@ pub(super) fn undeclared(_: &Effect, _: Declared<'_>) -> bool {
 }
 
 impl EffectKind {
-    /// Whether each motor of a robot has its own.
+    /// Returns whether each motor of a robot has its own.
     pub fn per_motor(&self) -> bool {
         matches!(self.place, Place::Motor | Place::Actuator)
     }
 
-    /// Whether it depends on the rotor's own angle.
+    /// Returns whether it depends on the rotor's own angle.
     pub fn by_angle(&self) -> bool {
         self.place == Place::Motor && self.series()
     }
 
-    /// Whether the parameters repeat, numbered from 1, as harmonics do.
+    /// Returns whether the parameters repeat, numbered from 1, as harmonics do.
     pub fn series(&self) -> bool {
         self.wave.is_some()
     }
 
-    /// What a wave of unit height does at a moment of a motor or axis, N m or N; 0 of one that has no waves.
-    pub fn wave_nm(&self, moment: &Moment) -> f64 {
+    /// Returns the action of a harmonic of unit amplitude on a motor or axis, N m or N; 0 without harmonics.
+    pub fn harmonic_nm(&self, moment: &MotionSample) -> f64 {
         self.wave.map_or(0.0, |wave| wave(1.0, moment).on_motor_nm(moment.direction()))
     }
 
-    /// Whether its waves act against the motion, so that one way they cannot be told from a torque.
-    pub fn waves_oppose(&self) -> bool {
-        self.wave.is_some_and(|wave| wave(1.0, &Moment::default()).friction_nm != 0.0)
+    /// Returns whether its waves act against the motion, so that one way they cannot be distinguished from a torque.
+    pub fn harmonics_oppose(&self) -> bool {
+        self.wave.is_some_and(|wave| wave(1.0, &MotionSample::default()).friction_nm != 0.0)
     }
 
-    /// Whether it can be on a machine.
+    /// Returns whether it can be on a machine.
     pub fn is_on(&self, machine: MachineKind) -> bool {
         self.machines.contains(&machine)
     }

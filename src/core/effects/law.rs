@@ -1,14 +1,14 @@
-//! What a law sees, and what it does.
+//! Inputs and outputs of effect laws.
 
-/// One instant of a motor, or of an axis, and of the robot that it drives: a tick of a simulation, a tick of a
-/// controller or a row of a log.
+/// Motion of a motor or axis, and of the robot that it drives, at one instant: a simulation step, a controller
+/// sample or a row of a log.
 ///
-/// On a linear axis the fields of the motor hold m, m/s, m/s² and N. Fields that a log or a controller cannot know are 0.
+/// On a linear axis the fields of the motor hold m, m/s, m/s² and N. Unknown fields are 0.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Moment {
+pub struct MotionSample {
     /// Time since the start, s.
     pub time_s: f64,
-    /// Time since the moment before, s.
+    /// Time since the previous sample, s.
     pub dt_s: f64,
     /// q of this motor, rad.
     pub motor_angle_rad: f64,
@@ -16,9 +16,9 @@ pub struct Moment {
     pub motor_speed_rad_s: f64,
     /// q̈ of this motor, rad/s².
     pub motor_accel_rad_s2: f64,
-    /// T that was asked of this motor, N m.
+    /// Torque command T of this motor, N m.
     pub torque_nm: f64,
-    /// ΣT that was asked of both motors, N m.
+    /// Sum of the torque commands of both motors, N m.
     pub torque_sum_nm: f64,
     /// x, m.
     pub x_m: f64,
@@ -34,23 +34,23 @@ pub struct Moment {
     pub pitch_accel_rad_s2: f64,
 }
 
-impl Moment {
-    /// Which way this motor turns: 1, −1, or 0 at rest.
+impl MotionSample {
+    /// Returns the direction of rotation: 1, −1, or 0 at standstill.
     pub fn direction(&self) -> f64 {
         if self.motor_speed_rad_s == 0.0 { 0.0 } else { self.motor_speed_rad_s.signum() }
     }
 }
 
-/// What an effect adds to the declared model's right-hand sides.
+/// Contribution of an effect to the right-hand sides of the declared model.
 ///
 /// With r1 and r2 as the residuals of translation and pitch (left side less declared right side), the effects of a
 /// robot sum to r1 = Σ on_motor/r + axle and r2 = −Σ on_motor + body; on a bench T − I q̈ − τ_f = −on_motor.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Action {
-    /// Torque inside the motor: so much on the shaft and the opposite on the body, N m (linear axis: N).
+    /// Torque inside the motor: on the shaft, with the opposite torque on the body, N m (linear axis: N).
     pub motor_nm: f64,
-    /// Level of dry friction inside the motor on top of the declared one, against the motion or holding a shaft at
-    /// rest, N m (linear axis: N).
+    /// Amplitude of dry friction inside the motor in addition to the declared friction,
+    /// N m (linear axis: N).
     pub friction_nm: f64,
     /// Horizontal force at the height of the axle, N.
     pub axle_n: f64,
@@ -59,12 +59,12 @@ pub struct Action {
 }
 
 impl Action {
-    /// A torque inside the motor, N m.
+    /// Creates a torque inside the motor, N m.
     pub fn motor(motor_nm: f64) -> Self {
         Self { motor_nm, ..Self::default() }
     }
 
-    /// A level of dry friction inside the motor, N m.
+    /// Creates dry friction inside the motor, N m.
     pub fn friction(friction_nm: f64) -> Self {
         Self { friction_nm, ..Self::default() }
     }
@@ -75,13 +75,13 @@ impl Action {
         Self { axle_n: force_n, body_nm, ..Self::default() }
     }
 
-    /// A torque on the body alone, N m.
+    /// Creates a torque on the body, N m.
     pub fn body(body_nm: f64) -> Self {
         Self { body_nm, ..Self::default() }
     }
 
-    /// All that acts on the shaft of a motor that turns in `direction` (1, −1, or 0 at rest, where dry friction is
-    /// whatever holds it), N m.
+    /// All that acts on the shaft of a motor that turns in `direction` (1, −1, or 0 at standstill, where dry friction
+    /// is whatever holds it), N m.
     pub fn on_motor_nm(&self, direction: f64) -> f64 {
         self.motor_nm - self.friction_nm * direction
     }
@@ -96,7 +96,7 @@ impl Action {
         }
     }
 
-    /// Whether all of it is finite.
+    /// Returns whether all of it is finite.
     pub fn is_finite(&self) -> bool {
         [self.motor_nm, self.friction_nm, self.axle_n, self.body_nm].iter().all(|value| value.is_finite())
     }
@@ -104,10 +104,10 @@ impl Action {
 
 /// A physical law with its memory. Moments are shown to it in their order, each once; it advances by their `dt_s`.
 pub trait Law: Send + Sync {
-    /// What it does at a moment.
-    fn act(&mut self, moment: &Moment) -> Action;
-    /// The same of a law without memory; none of one that has some.
-    fn at(&self, _: &Moment) -> Option<Action> {
+    /// Returns its action at a sample.
+    fn act(&mut self, moment: &MotionSample) -> Action;
+    /// Returns the action of a law without memory; `None` for a law with memory.
+    fn at(&self, _: &MotionSample) -> Option<Action> {
         None
     }
     /// The law with its memory.
@@ -117,9 +117,9 @@ pub trait Law: Send + Sync {
 /// A closure is a law with memory: what it captures.
 impl<F> Law for F
 where
-    F: FnMut(&Moment) -> Action + Clone + Send + Sync + 'static,
+    F: FnMut(&MotionSample) -> Action + Clone + Send + Sync + 'static,
 {
-    fn act(&mut self, moment: &Moment) -> Action {
+    fn act(&mut self, moment: &MotionSample) -> Action {
         self(moment)
     }
 
@@ -134,13 +134,13 @@ struct Memoryless<F>(F);
 
 impl<F> Law for Memoryless<F>
 where
-    F: Fn(&Moment) -> Action + Clone + Send + Sync + 'static,
+    F: Fn(&MotionSample) -> Action + Clone + Send + Sync + 'static,
 {
-    fn act(&mut self, moment: &Moment) -> Action {
+    fn act(&mut self, moment: &MotionSample) -> Action {
         (self.0)(moment)
     }
 
-    fn at(&self, moment: &Moment) -> Option<Action> {
+    fn at(&self, moment: &MotionSample) -> Option<Action> {
         Some((self.0)(moment))
     }
 
@@ -159,7 +159,7 @@ impl Clone for Box<dyn Law> {
 /// One summand of an effect: a law that is linear in its amplitude, at unit amplitude.
 #[derive(Clone)]
 pub struct Term {
-    /// Key of the amplitude; none where it is 1 whatever the parameters.
+    /// Key of the amplitude; `None` if it is 1 whatever the parameters.
     pub amplitude: Option<String>,
     /// The law at unit amplitude, fresh.
     pub law: Box<dyn Law>,
@@ -169,7 +169,7 @@ impl Term {
     /// A law without memory, with an amplitude.
     pub fn new<F>(amplitude: impl Into<String>, law: F) -> Self
     where
-        F: Fn(&Moment) -> Action + Clone + Send + Sync + 'static,
+        F: Fn(&MotionSample) -> Action + Clone + Send + Sync + 'static,
     {
         Self { amplitude: Some(amplitude.into()), law: Box::new(Memoryless(law)) }
     }

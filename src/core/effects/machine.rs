@@ -1,18 +1,6 @@
-//! What effects act on.
+//! Machine that effects act on.
 
-use crate::model_file::{AxisModel, AxisParameters, RobotModel};
-use crate::robot::RobotParameters;
-
-/// Kind of a machine.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum MachineKind {
-    /// A wheel-legged robot.
-    Robot,
-    /// A motor shaft on a bench.
-    Rotary,
-    /// A carriage.
-    Linear,
-}
+use crate::model::{AxisModel, AxisParameters, MachineKind, RobotModel, RobotParameters};
 
 /// The declared numbers that the size of an effect depends on.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,5 +46,5 @@ const NO_BODY: RobotParameters = RobotParameters {
     wheel_radius_m: 1.0,
     com_height_m: 0.0,
     body_inertia_kg_m2: 0.0,
-    gravity_m_s2: crate::robot::STANDARD_GRAVITY_M_S2,
+    gravity_m_s2: crate::model::STANDARD_GRAVITY_M_S2,
 };

@@ -22,14 +22,14 @@ mod sensors;
 mod surroundings;
 
 pub use acting::RobotLaws;
-pub use effect::{Effect, EffectError, EffectLaw};
+pub use effect::{EffectError, EffectLaw};
 pub use feedforward::EffectFeedforward;
 pub use kind::{
     Declared, EffectKind, Feedforward, Form, Grid, Parameter, Place, Role, Signal, Step, Trial,
     name_and_unit, unit_of,
 };
-pub use law::{Action, Law, Moment, Term};
-pub use machine::{Machine, MachineKind};
+pub use law::{Action, Law, MotionSample, Term};
+pub use machine::Machine;
 
 pub(crate) use friction::{COULOMB_ERROR, FRICTION_ASYMMETRY, VISCOUS_ERROR};
 pub(crate) use parameters::INERTIA_ERROR;
@@ -86,6 +86,15 @@ pub(crate) static PREFERRED: [&EffectKind; 8] = [
 ];
 
 /// The effect with an id; none where the library has no such effect.
+///
+/// ```
+/// use flqr_core::effects::kind;
+/// use flqr_core::model::MachineKind;
+///
+/// let cogging = kind("cogging").ok_or("unknown effect")?;
+/// assert!(cogging.is_on(MachineKind::Robot) && cogging.per_motor());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn kind(id: &str) -> Option<&'static EffectKind> {
     KINDS.iter().copied().find(|kind| kind.id == id)
 }

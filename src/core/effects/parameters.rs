@@ -1,26 +1,25 @@
-//! Declared numbers of the body and the wheels that are off.
+//! Errors of declared parameters of body and wheels.
 
-use super::effect::Effect;
 use super::kind::{Declared, EffectKind, Feedforward, Parameter, Place, Signal, Trial};
-use super::law::{Action, Moment, Term};
-use super::machine::MachineKind;
-use crate::model_file::{AxisModel, AxisParameters};
-use crate::robot::RobotParameters;
+use super::law::{Action, MotionSample, Term};
+use crate::model::Effect;
+use crate::model::MachineKind;
+use crate::model::{AxisModel, AxisParameters, RobotParameters};
 
 const ROBOT: &[MachineKind] = &[MachineKind::Robot];
 
-/// A declared M that is wrong, at the same height.
+/// Error of the declared body mass, at the same height.
 pub(super) static MASS_ERROR: EffectKind = EffectKind {
     id: "mass_error",
-    summary: "mass of the body that is off, at the declared height",
+    summary: "error of the body mass, at the declared height of the centre of mass",
     place: Place::Parameter,
     machines: ROBOT,
-    parameters: &[Parameter::amplitude("mass_kg", [-100.0, 100.0], "what is added to it")],
+    parameters: &[Parameter::amplitude("mass_kg", [-100.0, 100.0], "correction of the declared value")],
     wave: None,
     trial: Trial::PLAIN,
     make_terms: |machine, _| {
         let (height, gravity) = (machine.parameters.com_height_m, machine.parameters.gravity_m_s2);
-        vec![Term::new("mass_kg", move |m: &Moment| {
+        vec![Term::new("mass_kg", move |m: &MotionSample| {
             let (sin, cos) = libm::sincos(m.pitch_rad);
             let (rate, accel) = (m.pitch_rate_rad_s, m.pitch_accel_rad_s2);
             Action {
@@ -30,7 +29,7 @@ pub(super) static MASS_ERROR: EffectKind = EffectKind {
             }
         })]
     },
-    separated_by: "scales; a second height of the legs",
+    separated_by: "a scale; a second leg height",
     feedforward: Feedforward::Declared,
     declare: |effect, model| {
         let added = effect.parameters()[0].1;
@@ -38,19 +37,19 @@ pub(super) static MASS_ERROR: EffectKind = EffectKind {
     },
 };
 
-/// A declared l that is wrong.
+/// Error of the declared height of the centre of mass.
 pub(super) static COM_HEIGHT_ERROR: EffectKind = EffectKind {
     id: "com_height_error",
-    summary: "height of the centre of mass that is off",
+    summary: "error of the declared height of the centre of mass",
     place: Place::Parameter,
     machines: ROBOT,
-    parameters: &[Parameter::amplitude("height_m", [-3.0, 3.0], "what is added to it, to first order")],
+    parameters: &[Parameter::amplitude("height_m", [-3.0, 3.0], "correction, to first order")],
     wave: None,
     trial: Trial::PLAIN,
     make_terms: |machine, _| {
         let RobotParameters { body_mass_kg: mass, com_height_m: height, gravity_m_s2: gravity, .. } =
             machine.parameters;
-        vec![Term::new("height_m", move |m: &Moment| {
+        vec![Term::new("height_m", move |m: &MotionSample| {
             let (sin, cos) = libm::sincos(m.pitch_rad);
             let (rate, accel) = (m.pitch_rate_rad_s, m.pitch_accel_rad_s2);
             Action {
@@ -60,7 +59,7 @@ pub(super) static COM_HEIGHT_ERROR: EffectKind = EffectKind {
             }
         })]
     },
-    separated_by: "balancing the body on an edge; a second height of the legs",
+    separated_by: "balancing the body on an edge; a second leg height",
     feedforward: Feedforward::Declared,
     declare: |effect, model| {
         let added = effect.parameters()[0].1;
@@ -68,17 +67,19 @@ pub(super) static COM_HEIGHT_ERROR: EffectKind = EffectKind {
     },
 };
 
-/// A declared J that is wrong.
+/// Error of the declared body inertia.
 pub(super) static BODY_INERTIA_ERROR: EffectKind = EffectKind {
     id: "body_inertia_error",
-    summary: "inertia of the body about its centre of mass that is off",
+    summary: "error of the declared inertia of the body about its centre of mass",
     place: Place::Parameter,
     machines: ROBOT,
-    parameters: &[Parameter::amplitude("inertia_kg_m2", [-100.0, 100.0], "what is added to it")],
+    parameters: &[Parameter::amplitude("inertia_kg_m2", [-100.0, 100.0], "correction of the declared value")],
     wave: None,
     trial: Trial::PLAIN,
-    make_terms: |_, _| vec![Term::new("inertia_kg_m2", |m: &Moment| Action::body(-m.pitch_accel_rad_s2))],
-    separated_by: "the period of the body as a pendulum, hung up by the axle",
+    make_terms: |_, _| {
+        vec![Term::new("inertia_kg_m2", |m: &MotionSample| Action::body(-m.pitch_accel_rad_s2))]
+    },
+    separated_by: "the period of the body as a pendulum, suspended at the axle",
     feedforward: Feedforward::Declared,
     declare: |effect, model| {
         let added = effect.parameters()[0].1;
@@ -86,26 +87,26 @@ pub(super) static BODY_INERTIA_ERROR: EffectKind = EffectKind {
     },
 };
 
-/// A declared I, or the mass of a carriage, that is wrong.
+/// Error of the declared wheel inertia or carriage mass.
 pub(crate) static INERTIA_ERROR: EffectKind = EffectKind {
     id: "inertia_error",
-    summary: "inertia of each wheel with its rotor, of the shaft, or mass of the carriage that is off",
+    summary: "error of the declared inertia of each wheel with its rotor or of the shaft, or of the mass of the carriage",
     place: Place::Parameter,
     machines: &[MachineKind::Robot, MachineKind::Rotary, MachineKind::Linear],
-    parameters: &[Parameter::amplitude("inertia_kg_m2", [-100.0, 100.0], "what is added to it")
+    parameters: &[Parameter::amplitude("inertia_kg_m2", [-100.0, 100.0], "correction of the declared value")
         .linear("mass_kg", [-1e4, 1e4])],
     wave: None,
     trial: Trial::PLAIN.of(Signal::Acceleration),
     make_terms: |machine, _| {
         let key = INERTIA_ERROR.parameters[0].key(machine.kind);
         if machine.kind != MachineKind::Robot {
-            return vec![Term::new(key, |m: &Moment| Action::motor(-m.motor_accel_rad_s2))];
+            return vec![Term::new(key, |m: &MotionSample| Action::motor(-m.motor_accel_rad_s2))];
         }
         let radius = machine.parameters.wheel_radius_m;
         let both = 2.0 / (radius * radius);
-        vec![Term::new(key, move |m: &Moment| Action::force(-both * m.x_accel_m_s2, 0.0, 0.0))]
+        vec![Term::new(key, move |m: &MotionSample| Action::force(-both * m.x_accel_m_s2, 0.0, 0.0))]
     },
-    separated_by: "fast changes of speed with the wheel in the air",
+    separated_by: "rapid speed changes with the wheel in the air",
     feedforward: Feedforward::Declared,
     declare: |effect, model| correct_moved(effect, model),
 };
@@ -134,7 +135,7 @@ fn correct_moved(effect: &Effect, model: Declared<'_>) -> bool {
     possible
 }
 
-/// Corrects the parameters of a robot; not into those that no robot can have.
+/// Corrects the parameters of a robot if the result is physically possible.
 fn correct_robot(model: Declared<'_>, corrected: impl Fn(RobotParameters) -> RobotParameters) -> bool {
     let Declared::Robot(robot) = model else { return false };
     let parameters = corrected(robot.parameters);

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::effects::Effect;
+use crate::model::Effect;
 
 use super::{Controller, FeedforwardNumbers, Motors, Scheduled};
 
@@ -18,7 +18,7 @@ fn write_header(controller: &Controller, text: &mut String) -> std::fmt::Result 
     writeln!(text, "            + friction feedforward; SI units, rad. */")?;
     if !controller.effects.is_empty() {
         let ids: Vec<&str> = controller.effects.iter().map(Effect::id).collect();
-        writeln!(text, "/* Not fed forward here, although the model has it: {}. */", ids.join(", "))?;
+        writeln!(text, "/* Effects of the model without feedforward here: {}. */", ids.join(", "))?;
     }
     writeln!(text, "#ifndef FLQR_CONTROLLER_H\n#define FLQR_CONTROLLER_H\n\n#include <math.h>\n")?;
     writeln!(text, "/* Rows: left, right motor. N m/m, N m s/m, N m/rad, N m s/rad. */")?;
@@ -28,7 +28,10 @@ fn write_header(controller: &Controller, text: &mut String) -> std::fmt::Result 
         write_schedule(&controller.schedule, text)?;
     }
     let hold = &controller.yaw_hold;
-    writeln!(text, "/* Torque of one motor for each rad and rad/s of turning, opposite to the other's. */")?;
+    writeln!(
+        text,
+        "/* Torque of one motor for each rad and rad/s of yaw, opposite to the other motor's. */"
+    )?;
     writeln!(text, "static const double flqr_yaw_stiffness_nm_rad = {:?};", hold.stiffness_nm_rad)?;
     writeln!(text, "static const double flqr_yaw_damping_nm_s_rad = {:?};\n", hold.damping_nm_s_rad)?;
     writeln!(text, "static const double flqr_wheel_radius_m = {:?};", controller.wheel_radius_m)?;
@@ -45,7 +48,7 @@ fn write_header(controller: &Controller, text: &mut String) -> std::fmt::Result 
     writeln!(text, "\n#endif")
 }
 
-/// What goes into the control law, and what makes it of the sensors' readings.
+/// Inputs of the control law and their computation from sensor readings.
 const TYPES: &str = "/* Pairs: left, right. Yaw: left positive. */
 typedef struct {
     double motor_angle_rad[2], motor_speed_rad_s[2], pitch_rad, pitch_rate_rad_s;
@@ -56,7 +59,7 @@ typedef struct {
     double motor_speed_rad_s[2], yaw_rad, yaw_rate_rad_s;
 } flqr_measurement;
 
-/* Where to be: all zero for standing at the start. */
+/* Setpoint: all zero to stand at the start. */
 typedef struct {
     double state[4], yaw_rad;
 } flqr_reference;
@@ -87,7 +90,7 @@ fn gain(gain: &Motors<[f64; 4]>, indent: &str) -> String {
 fn write_schedule(schedule: &[Scheduled], text: &mut String) -> std::fmt::Result {
     let nodes = schedule.len();
     let heights: Vec<f64> = schedule.iter().map(|node| node.leg_height_m).collect();
-    writeln!(text, "/* Gains over the legs' height, m, lowest first. */")?;
+    writeln!(text, "/* Gains over leg height, m, lowest first. */")?;
     writeln!(text, "#define FLQR_HEIGHTS {nodes}")?;
     writeln!(text, "static const double flqr_leg_height_m[FLQR_HEIGHTS] = {{{}}};", list(&heights))?;
     writeln!(text, "static const flqr_gains flqr_gain_over_height[FLQR_HEIGHTS] = {{")?;
@@ -97,18 +100,18 @@ fn write_schedule(schedule: &[Scheduled], text: &mut String) -> std::fmt::Result
     text.write_str(
         "};
 
-/* Gain at a height of the legs, linear between those of the table, that of the end beyond them. */
+/* Gain at a leg height, interpolated linearly in the table and clamped at its ends. */
 static inline flqr_gains flqr_gain_at(double leg_height_m)
 {
     int above = 1;
     while (above < FLQR_HEIGHTS - 1 && flqr_leg_height_m[above] < leg_height_m)
         ++above;
     const double lower = flqr_leg_height_m[above - 1], upper = flqr_leg_height_m[above];
-    const double share = fmax(0.0, fmin(1.0, (leg_height_m - lower) / (upper - lower)));
+    const double fraction = fmax(0.0, fmin(1.0, (leg_height_m - lower) / (upper - lower)));
     flqr_gains gain = flqr_gain_over_height[above - 1];
     for (int motor = 0; motor < 2; ++motor)
         for (int i = 0; i < 4; ++i)
-            gain.k[motor][i] += share * (flqr_gain_over_height[above].k[motor][i] - gain.k[motor][i]);
+            gain.k[motor][i] += fraction * (flqr_gain_over_height[above].k[motor][i] - gain.k[motor][i]);
     return gain;
 }
 
@@ -147,7 +150,7 @@ fn write_feedforward(
 
 fn write_step(controller: &Controller, text: &mut String) -> std::fmt::Result {
     text.write_str(
-        "/* torque_nm (N m): left, right. gain: &flqr_gain, or that of another height of the legs. */
+        "/* torque_nm (N m): left, right. gain: &flqr_gain, or the gain at another leg height. */
 static inline void flqr_step(const flqr_gains *gain, const flqr_measurement *measurement,
     const flqr_reference *reference, double torque_nm[2])
 {
@@ -165,7 +168,7 @@ static inline void flqr_step(const flqr_gains *gain, const flqr_measurement *mea
             "        torque += flqr_feedforward_nm(motor, measurement->motor_speed_rad_s[motor]);"
         )?;
     }
-    writeln!(text, "        if (!isfinite(torque)) /* a sensor that failed cannot drive the robot */")?;
+    writeln!(text, "        if (!isfinite(torque)) /* a failed sensor must not drive the robot */")?;
     writeln!(text, "            torque = 0.0;")?;
     if controller.torque_limit_nm.is_some() {
         writeln!(text, "        torque = fmax(-flqr_torque_limit_nm, fmin(flqr_torque_limit_nm, torque));")?;

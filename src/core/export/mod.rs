@@ -7,9 +7,8 @@ use nalgebra::Matrix2x4;
 use serde::Serialize;
 
 use crate::control::{BalanceController, GainSchedule, ScheduleNode};
-use crate::effects::Effect;
 use crate::friction::{Compensation, Feedforward, StribeckParameters};
-use crate::robot::YawHold;
+use crate::model::{Effect, YawHold};
 
 /// Forms of an exported controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,10 +32,10 @@ pub struct Controller {
     pub state: [&'static str; 4],
     /// K of either motor, N m per unit of the state.
     pub gain: Motors<[f64; 4]>,
-    /// Gains over the legs' height; absent for a robot of one height.
+    /// Gains over leg height; absent for a robot of one height.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub schedule: Vec<Scheduled>,
-    /// What keeps the heading: torque of one motor, opposite to the other's.
+    /// Heading control: torque of one motor, opposite to the other's.
     pub yaw_hold: YawHold,
     /// r in x = r (q + pitch), m.
     pub wheel_radius_m: f64,
@@ -54,7 +53,7 @@ pub struct Controller {
     pub effects: Vec<Effect>,
 }
 
-/// The gain at one height of the legs.
+/// The gain at one leg height.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Scheduled {
     /// Height, m; between heights the gain is linear, beyond them that of the end.
@@ -118,6 +117,20 @@ impl Controller {
     }
 
     /// The controller as text.
+    ///
+    /// ```
+    /// # let model = flqr_core::model_file::presets::paper();
+    /// # let robot = model.robot().ok_or("no robot")?;
+    /// # let linear = robot.parameters.linear_model();
+    /// # let gain = flqr_core::lqr::design(&linear, &robot.weights.ok_or("no weights")?)?.gain;
+    /// # use flqr_core::control::{BalanceController, ControllerKind};
+    /// use flqr_core::export::{Controller, Format};
+    ///
+    /// let controller = BalanceController::new(ControllerKind::Flqr, robot, gain)?;
+    /// let header = Controller::new("robot", &controller, None).render(Format::CHeader);
+    /// assert!(header.contains("#include <math.h>"));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn render(&self, format: Format) -> String {
         match format {
             Format::CHeader => c_header::render(self),

@@ -1,16 +1,16 @@
-//! Friction feedforward u' = u + τ_f(q̇) (Eq. 29), usable at rest.
+//! Friction feedforward u' = u + τ_f(q̇) (Eq. 29), usable at standstill.
 
 use serde::{Deserialize, Serialize};
 
 use super::Stribeck;
 use crate::parameter::{ParameterError, positive, within};
 
-/// How the identified curve is fed forward. The paper is silent on q̇ ≈ 0, where a quantised speed
+/// Feedforward of the identified curve. The paper does not specify q̇ ≈ 0, where a quantised speed
 /// dithers and sign(q̇) would chatter; so the direction is smoothed and the whole scaled below one.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Compensation {
-    /// Share of the friction that is compensated, 0 to 1.5, without unit.
+    /// Fraction of the friction that is compensated, 0 to 1.5, without unit.
     pub ratio: f64,
     /// Speed over which the direction turns from −1 to 1: sign(q̇) becomes tanh(q̇ / speed), rad/s.
     pub smoothing_speed_rad_s: f64,
@@ -50,10 +50,20 @@ impl Feedforward {
 
     /// Torque to add to the controller's, N m. At q̇ = 0 it is ratio · f_p with the finite slope
     /// ratio · (f_s / smoothing speed + f_v).
+    ///
+    /// ```
+    /// use flqr_core::friction::{Compensation, Feedforward, Stribeck, StribeckParameters};
+    ///
+    /// let curve = Stribeck::new(StribeckParameters { coulomb_nm: 0.2, static_nm: 0.2, ..StribeckParameters::NONE })?;
+    /// let feedforward = Feedforward::new(curve, Compensation { ratio: 0.8, smoothing_speed_rad_s: 0.1 })?;
+    /// assert_eq!(feedforward.torque_nm(0.0), 0.0);
+    /// assert!((feedforward.torque_nm(10.0) - 0.16).abs() < 1e-12);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn torque_nm(&self, motor_speed_rad_s: f64) -> f64 {
         let p = self.curve.parameters();
         let direction = libm::tanh(motor_speed_rad_s / self.compensation.smoothing_speed_rad_s);
-        let friction = self.curve.level_nm(motor_speed_rad_s) * direction
+        let friction = self.curve.amplitude_nm(motor_speed_rad_s) * direction
             + p.viscous_nm_s_rad * motor_speed_rad_s
             + p.offset_nm;
         self.compensation.ratio * friction

@@ -43,6 +43,15 @@ pub struct Stribeck {
 impl Stribeck {
     /// Checks the parameters: levels and viscous coefficient not negative, speed and exponent above zero
     /// (at zero Eq. 28 is singular or f_s has no effect), exponent at most 10.
+    ///
+    /// ```
+    /// use flqr_core::friction::{Stribeck, StribeckParameters};
+    ///
+    /// let friction = Stribeck::new(StribeckParameters { coulomb_nm: 0.2, static_nm: 0.3, ..StribeckParameters::NONE })?;
+    /// assert!((friction.torque_nm(50.0) - 0.2).abs() < 1e-12);
+    /// assert_eq!(friction.torque_nm(-50.0), -friction.torque_nm(50.0));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn new(parameters: StribeckParameters) -> Result<Self, ParameterError> {
         not_negative("coulomb_nm", parameters.coulomb_nm)?;
         not_negative("static_nm", parameters.static_nm)?;
@@ -67,11 +76,13 @@ impl Stribeck {
     pub fn torque_nm(&self, motor_speed_rad_s: f64) -> f64 {
         let p = &self.parameters;
         let direction = if motor_speed_rad_s == 0.0 { 0.0 } else { motor_speed_rad_s.signum() };
-        self.level_nm(motor_speed_rad_s) * direction + p.viscous_nm_s_rad * motor_speed_rad_s + p.offset_nm
+        self.amplitude_nm(motor_speed_rad_s) * direction
+            + p.viscous_nm_s_rad * motor_speed_rad_s
+            + p.offset_nm
     }
 
     /// f_c + (f_s − f_c) exp(−(|q̇|/v_s)^ξ), N m: Eq. 28 without direction, viscous part and offset.
-    pub fn level_nm(&self, motor_speed_rad_s: f64) -> f64 {
+    pub fn amplitude_nm(&self, motor_speed_rad_s: f64) -> f64 {
         let p = &self.parameters;
         let ratio = motor_speed_rad_s.abs() / p.stribeck_speed_rad_s;
         let fading = libm::exp(-libm::pow(ratio, p.stribeck_exponent));

@@ -1,13 +1,13 @@
-//! Why a fit is refused.
+//! Reason why a fit is refused.
 
 use super::motion::MotionError;
 use crate::record::{LogError, LogKind};
 
-/// Why no fit could be made; each says what, where and the mend.
+/// Reason why no fit could be made: what is wrong, where, and how to fix it.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FitError {
     /// Nothing to fit.
-    #[error("no log was given, name at least one")]
+    #[error("no log was given: name at least one")]
     NoLogs,
     /// A log lacks columns.
     #[error(transparent)]
@@ -17,14 +17,14 @@ pub enum FitError {
     Motion(#[from] MotionError),
     /// A model of another axis.
     #[error(
-        "{file} is a {kind} and the model describes the axis of a {wanted}, give a model of the same axis or none"
+        "{file} is a {kind}, but the model describes the axis of a {wanted}: give a model of the same axis, or none"
     )]
     WrongModel {
         /// The log.
         file: String,
-        /// What it holds.
+        /// Its kind.
         kind: LogKind,
-        /// What the model is for.
+        /// Kind of machine of the model.
         wanted: LogKind,
     },
     /// A number that is none.
@@ -56,7 +56,7 @@ pub enum FitError {
         limit: f64,
     },
     /// A name that is not one of the six.
-    #[error("`{name}` is not a parameter that constant speeds give, estimate all or some of {allowed}")]
+    #[error("`{name}` cannot be estimated from constant speeds: estimate all or some of {allowed}")]
     UnknownParameter {
         /// The name.
         name: String,
@@ -65,12 +65,12 @@ pub enum FitError {
     },
     /// No stretch of constant speed is long enough.
     #[error(
-        "{file}: no stretch of constant speed is long enough for pairs ({reason}), hold each speed for {seconds} s or more"
+        "{file}: no segment of constant speed is long enough for friction pairs ({reason}): hold each speed for {seconds} s or more"
     )]
     NoPairs {
         /// The log.
         file: String,
-        /// What was found instead.
+        /// Kind found instead.
         reason: String,
         /// Stretches of constant speed that are too short.
         short_dwells: usize,
@@ -79,12 +79,12 @@ pub enum FitError {
     },
     /// One speed tells nothing about a curve.
     #[error(
-        "all {pairs} pairs of {file} are at one speed, {speed_rad_s:.3} rad/s: record at least {needed} speeds, or give the logs of the others too"
+        "all {pairs} pairs of {file} are at one speed, {speed_rad_s:.3} rad/s: record at least {needed} speeds, or add logs at other speeds"
     )]
     OneSpeed {
         /// The logs.
         file: String,
-        /// How many pairs there are.
+        /// Number of pairs.
         pairs: usize,
         /// Their speed, rad/s.
         speed_rad_s: f64,
@@ -93,7 +93,7 @@ pub enum FitError {
     },
     /// Six parameters need six speeds.
     #[error(
-        "the pairs of {file} have {found} distinct speeds and six parameters need at least {needed}: record more speeds"
+        "the pairs of {file} have {found} distinct speeds, but six parameters need at least {needed}: record more speeds"
     )]
     TooFewSpeeds {
         /// The logs.
@@ -105,7 +105,7 @@ pub enum FitError {
     },
     /// Torques without any difference.
     #[error(
-        "the torques of {file} are all {value} N m: the torque column is not a measured or commanded torque, map the right one"
+        "the torques of {file} are all {value} N m: the torque column is neither a measured nor a commanded torque: map the right one"
     )]
     ConstantTorque {
         /// The logs.
@@ -114,39 +114,39 @@ pub enum FitError {
         value: f64,
     },
     /// Logs that answer different questions.
-    #[error("{first} holds {first_kind} and {second} holds {second_kind}: fit them apart")]
+    #[error("{first} contains {first_kind} and {second} contains {second_kind}: fit them separately")]
     MixedLogs {
         /// A log.
         first: String,
-        /// What it holds.
+        /// Its kind.
         first_kind: &'static str,
         /// Another log.
         second: String,
-        /// What that one holds.
+        /// Its kind.
         second_kind: &'static str,
     },
     /// Data are wanting, and of what was recorded a part could not be read.
     #[error("{refusal}; {unread}")]
     Unread {
-        /// What is wanting.
+        /// Missing column.
         refusal: Box<FitError>,
-        /// What could not be read, with lines and columns, and the mend.
+        /// Unreadable parts, with lines and columns, and the remedy.
         unread: String,
     },
     /// A robot on its wheels does not show its motors' friction alone.
     #[error(
-        "{file}: a robot log gives friction only with the wheels in the air at constant speeds, record such a sweep"
+        "{file}: a robot log gives friction only with the wheels in the air at constant speeds: record such a sweep"
     )]
     RobotMotion {
         /// The log.
         file: String,
     },
     /// The watcher ended the fit.
-    #[error("the fit was cancelled after {iteration} of {iterations} iterations, start it again")]
+    #[error("the fit was cancelled after {iteration} of {iterations} iterations: start it again")]
     Cancelled {
         /// Iterations done.
         iteration: usize,
-        /// Iterations asked for.
+        /// Iterations requested.
         iterations: usize,
     },
 }

@@ -5,16 +5,17 @@ use std::ops::ControlFlow;
 use super::motion::{Axis, KnownAxis, MotionError, fit_motion};
 use super::parameters::KEYS;
 use super::{
-    Estimate, FitError, FitOptions, FitProgress, FitReport, FrictionPair, Motor, PairSet, StopReason,
-    fit_pairs, pairs_from_log,
+    Estimate, FitError, FitOptions, FitProgress, FitReport, FrictionPair, PairSet, StopReason, fit_pairs,
+    pairs_from_log,
 };
-use crate::model_file::{AxisModel, AxisParameters, Model, Rig};
+use crate::model::Motor;
+use crate::model::{AxisModel, AxisParameters, Model, Rig};
 use crate::record::{HealthFinding, Log, LogKind, Severity, data_health};
 
 /// From this many short dwells on a log looks like a staircase.
 const FEW_DWELLS: usize = 3;
 
-/// What a log holds.
+/// Kind of data of a log.
 enum Content {
     Pairs(PairSet),
     /// With why it gave no pairs, where it looks like a recording of constant speeds.
@@ -38,7 +39,7 @@ impl Content {
     }
 }
 
-/// Whether constant speeds give the parameters that are named; a warning where they are not all of them.
+/// Returns whether constant speeds give the parameters that are named; a warning where they are not all of them.
 fn check_estimate(names: &[String]) -> Result<Option<String>, FitError> {
     let is_known = |name: &str| name == "all" || KEYS.contains(&name);
     if let Some(name) = names.iter().find(|name| !is_known(name)) {
@@ -48,7 +49,7 @@ fn check_estimate(names: &[String]) -> Result<Option<String>, FitError> {
     let partly = !names.is_empty() && !KEYS.into_iter().all(named);
     Ok(partly.then(|| {
         format!(
-            "`{}` was asked for: constant speeds give all six parameters only together",
+            "`{}` was requested, but constant speeds give all six parameters only together",
             names.join("`, `")
         )
     }))
@@ -62,6 +63,22 @@ fn check_estimate(names: &[String]) -> Result<Option<String>, FitError> {
 ///
 /// # Errors
 /// See [`FitError`].
+///
+/// ```
+/// use std::ops::ControlFlow;
+///
+/// use flqr_core::identify::{FitOptions, fit};
+/// use flqr_core::model::Motor;
+/// use flqr_core::model_file::presets;
+/// use flqr_core::simulate::{ControllerChoice, Experiment, Scenario, run};
+///
+/// let model = presets::paper();
+/// let experiment = Experiment { seconds: 60.0, ..Experiment::new(Scenario::FrictionSweep, ControllerChoice::Pi) };
+/// let log = run(&experiment, &model, &model, &mut |_| ControlFlow::Continue(()))?.log(Motor::Left);
+/// let fit = fit(&[log], None, Motor::Left, &FitOptions::default(), &mut |_| ControlFlow::Continue(()))?;
+/// assert!(fit.relative_error < 0.05 && fit.parameters["coulomb_nm"].value > 0.0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn fit(
     logs: &[Log],
     model: Option<&Model>,
@@ -150,7 +167,8 @@ fn note_of(log: &Log, error: &FitError) -> Option<String> {
     let FitError::NoPairs { short_dwells, .. } = error else { return None };
     let target = log.column("target_speed_rad_s");
     let has_target = target.is_some_and(|values| values.iter().any(|value| value.is_finite()));
-    (has_target || *short_dwells >= FEW_DWELLS).then(|| format!("it was fitted as a motion: {error}"))
+    (has_target || *short_dwells >= FEW_DWELLS)
+        .then(|| format!("fitted as a general motion instead: {error}"))
 }
 
 /// The kind of a log; the model's axis decides where the columns serve both axes, and must fit them.
@@ -185,8 +203,8 @@ fn sources(logs: &[Log]) -> String {
 fn findings(log: &Log, content: &Content) -> Vec<HealthFinding> {
     let mut findings = data_health(log);
     if let Content::Pairs(set) = content {
-        let mend = "hold each speed longer and steadier";
-        let finding = |problem| HealthFinding::new(Severity::Info, "motor_speed_rad_s", problem, mend);
+        let remedy = "hold each speed longer and more constant";
+        let finding = |problem| HealthFinding::new(Severity::Info, "motor_speed_rad_s", problem, remedy);
         findings.extend(set.warnings.iter().map(finding));
     }
     findings
@@ -227,7 +245,7 @@ fn motion_report(
     })
 }
 
-/// What a model knows of the axis on the bench; of a robot it is one wheel in the air.
+/// Model of the axis on the bench; for a robot, one wheel in the air.
 fn known_axis(model: &Model, motor: Motor) -> KnownAxis {
     match &model.rig {
         Rig::Robot(robot) => KnownAxis {

@@ -12,7 +12,7 @@ const FEW_SPEEDS: usize = 7;
 /// The Stribeck effect shows below this speed, rad/s.
 const SLOW_RAD_S: f64 = 0.2;
 
-/// What the pairs themselves leave open, whatever the fit within the box.
+/// Limitations of the pairs, independent of the fit.
 pub(super) fn pair_warnings(pairs: &[FrictionPair], range: &SearchBox) -> Vec<String> {
     let mut warnings = Vec::new();
     let magnitudes = distinct_speeds(pairs.iter().map(|p| p.speed_rad_s.abs()));
@@ -29,20 +29,16 @@ pub(super) fn pair_warnings(pairs: &[FrictionPair], range: &SearchBox) -> Vec<St
         ));
     }
     if one_direction(pairs) {
-        let done = if range.width(OFFSET) > 0.0 {
-            "their values share what was measured in any proportion"
-        } else {
-            "is set to 0"
-        };
+        let done = if range.width(OFFSET) > 0.0 { "only their sum is identified" } else { "is set to 0" };
         warnings.push(format!(
-            "all speeds have one direction: `offset_nm` can't be told from `coulomb_nm` and {done}, record the \
-             other direction too"
+            "all speeds have the same direction: `offset_nm` cannot be separated from `coulomb_nm` and {done}, \
+             record the other direction too"
         ));
     }
     warnings
 }
 
-/// What the fit leaves open.
+/// Limitations of the fit.
 pub(super) fn fit_warnings(
     point: &Point,
     range: &SearchBox,
@@ -54,14 +50,14 @@ pub(super) fn fit_warnings(
     let loose: Vec<&str> = (0..6).filter(|&d| is_loose(point, confidence, d)).map(|d| KEYS[d]).collect();
     if !loose.is_empty() {
         warnings.push(format!(
-            "the data do not determine `{}`: the 95 % interval is wider than the value or open within the searched \
-             range; judge the fit by its curve over the measured speeds",
+            "the data do not determine `{}`: the 95 % interval is wider than the value or unbounded within the \
+             search range; assess the fit by its curve over the measured speeds",
             loose.join("`, `")
         ));
     }
     if confidence.condition > ILL_CONDITIONED {
         warnings.push(format!(
-            "the parameters trade off against each other (condition number {:.1e}): other sets fit as well",
+            "the parameters trade off against each other (condition number {:.1e}): other values fit equally well",
             confidence.condition
         ));
     }
@@ -82,10 +78,7 @@ fn bound_warnings(point: &Point, range: &SearchBox, bounds: Bounds) -> impl Iter
             Bounds::Paper => "the paper's bound excludes the optimum, fit with bounds from the data",
             Bounds::Data => "the data do not determine it, or the model lacks an effect",
         };
-        Some(format!(
-            "`{}` = {:.3e} sits on the {side} end of its searched range: {cause}",
-            KEYS[d], point[d]
-        ))
+        Some(format!("`{}` = {:.3e} is at the {side} end of its search range: {cause}", KEYS[d], point[d]))
     })
 }
 

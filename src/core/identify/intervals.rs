@@ -12,15 +12,15 @@ use nalgebra::{SMatrix, SVector};
 use super::SearchBox;
 use super::parameters::{COULOMB, EXPONENT, OFFSET, Point, SPEED, STATIC, VISCOUS};
 use super::polish::{Fit, polish_from};
-use super::quantile::student_t_975;
 use super::samples::Samples;
+use crate::signal::quantile::student_t_975;
 
-/// What the data say about the six parameters.
+/// Information of the data on the six parameters.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Confidence {
-    /// None where the parameter was not fitted, or there are no more pairs than parameters.
+    /// `None` if the parameter was not fitted or there are not more pairs than parameters.
     pub(super) intervals: [Option<[f64; 2]>; 6],
-    /// Whether an interval ends at its searched range on either side.
+    /// True if an interval ends at its searched range on either side.
     pub(super) open: [bool; 6],
     /// Condition number of JᵀJ with columns scaled to length 1.
     pub(super) condition: f64,

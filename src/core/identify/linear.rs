@@ -17,7 +17,7 @@ pub(super) struct LinearFit {
     pub(super) free: [bool; 4],
 }
 
-/// Where one entry is held.
+/// Solution with one entry fixed.
 #[derive(Clone, Copy, PartialEq)]
 enum Hold {
     Free,

@@ -6,7 +6,7 @@
 //!   polishes to the optimum, and profile likelihood gives the intervals.
 //! - Any other motion of one axis gives inertia or mass and friction ([`motion`]).
 //!
-//! [`excitation`] has the motions that such logs are recorded with.
+//! [`crate::excitation`] has the motions that such logs are recorded with.
 //!
 //! | symbol of the paper | here |
 //! |---|---|
@@ -17,9 +17,7 @@
 //! | K (section 3.1) | edge samples, a tenth of a dwell |
 
 mod error;
-pub mod excitation;
 mod exp2;
-pub mod filter;
 mod fit;
 mod identifiability;
 mod intervals;
@@ -28,7 +26,6 @@ pub mod motion;
 mod pairs;
 mod parameters;
 mod polish;
-pub mod quantile;
 mod report;
 mod samples;
 mod search_box;
@@ -42,7 +39,6 @@ mod swarm;
 #[cfg(test)]
 mod test_data;
 
-pub use crate::robot::Motor;
 pub use error::FitError;
 pub use fit::fit;
 pub use pairs::{Dwell, PairSet, pairs_from_log};
@@ -64,7 +60,7 @@ pub struct FrictionPair {
     pub torque_nm: f64,
 }
 
-/// How the six parameters are searched.
+/// Search method for the six parameters.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Method {
     /// The swarm, then the polish to the optimum, then intervals.
@@ -74,12 +70,12 @@ pub enum Method {
     Pso,
 }
 
-/// What to fit and how.
+/// Options of a fit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FitOptions {
-    /// How the six parameters are searched.
+    /// Search method for the six parameters.
     pub method: Method,
-    /// Where they are searched.
+    /// Bounds of the search.
     pub bounds: Bounds,
     /// Parameters to free in fits from motion, keys as in the model file, or `all`. Naming `inertia_kg_m2` or
     /// `mass_kg` asks for such a fit also where a log of a bench holds constant speeds; these give all six

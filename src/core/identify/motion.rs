@@ -5,7 +5,7 @@
 //! effort = J·v̇ + f_v·v + f(v)·sign(v) + f_p + G·sin(angle)
 //!
 //! with f(v) = f_c, or f_c + (f_s − f_c)·exp(−(|v|/v_s)^ξ) (Eq. 28) where the model has the Stribeck three or
-//! they are asked for. G is the load of a pendulum (rotary axes, angle 0 hanging down).
+//! they are requested. G is the load of a pendulum (rotary axes, angle 0 hanging down).
 //!
 //! # Procedure
 //! The inverse dynamic identification of M. Gautier and A. Janot, as published with the EMPS benchmark, with
@@ -25,7 +25,7 @@
 //! 6. 95 % intervals by leaving out one block of neighbouring rows after another, so that they hold under
 //!    coloured residuals. They do not cover errors of the model itself or of the torque's scale.
 //!
-//! A parameter that the motion does not excite is held at the model's value, or left out without a model, and
+//! A parameter that the motion does not excite is fixed at the model's value, or left out without a model, and
 //! a warning says so.
 
 pub mod kinematics;
@@ -38,7 +38,7 @@ use std::ops::ControlFlow;
 use serde::Serialize;
 
 use crate::friction::StribeckParameters;
-use crate::model_file::{AxisModel, AxisParameters};
+use crate::model::{AxisModel, AxisParameters};
 use crate::record::{Log, LogError, LogKind};
 use problem::Problem;
 
@@ -118,7 +118,7 @@ impl Axis {
     }
 }
 
-/// What a model says about the axis; parameters that are not estimated keep these values.
+/// Model of the axis; parameters that are not estimated keep these values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KnownAxis {
     /// Inertia, kg m², or mass, kg.
@@ -150,11 +150,11 @@ pub struct MotionParameter {
     pub value: f64,
     /// 95 % interval; none for a held value, or where the log is too short for one.
     pub ci95: Option<[f64; 2]>,
-    /// Whether the value is the model's and not an estimate.
+    /// True if the value is the model's and not an estimate.
     pub held: bool,
 }
 
-/// What a fit from motion was made to agree with, row by row, log after log: to see where it does not.
+/// Data of a fit from motion, row by row, log after log: to see where it does not.
 ///
 /// All of it has passed the filters of the fit; rows near a rest are left out, as they were of the fit.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -165,7 +165,7 @@ pub struct MotionSeries {
     pub speed: Vec<f64>,
     /// Measured torque or force, N m or N.
     pub measured: Vec<f64>,
-    /// The same as the fitted model has it; `rmse` is that of the differences.
+    /// Prediction of the fitted model; `rmse` is that of the differences.
     pub fitted: Vec<f64>,
 }
 
@@ -186,9 +186,9 @@ pub struct MotionFit {
     pub series: MotionSeries,
     /// Cut-off of the position filter for each log, Hz.
     pub cutoff_hz: Vec<f64>,
-    /// Condition number of the scaled columns: near 1 independent, above 100 hard to tell apart.
+    /// Condition number of the scaled columns: near 1 independent, above 100 hard to distinguish.
     pub condition_number: f64,
-    /// What to know before believing the values.
+    /// Warnings on the reliability of the values.
     pub warnings: Vec<String>,
 }
 
@@ -199,7 +199,7 @@ impl MotionFit {
     }
 }
 
-/// Why a motion could not be fitted.
+/// Reason why a motion could not be fitted.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MotionError {
@@ -207,10 +207,10 @@ pub enum MotionError {
     #[error(transparent)]
     Log(#[from] LogError),
     /// No log was given.
-    #[error("there is no log to fit, name at least one")]
+    #[error("there is no log to fit: name at least one")]
     NoLog,
     /// A name that is not a parameter of this axis.
-    #[error("`{name}` is not a parameter of this axis, estimate all or some of {allowed}")]
+    #[error("`{name}` is not a parameter of this axis: estimate all or some of {allowed}")]
     UnknownParameter {
         /// The name.
         name: String,
@@ -218,7 +218,7 @@ pub enum MotionError {
         allowed: String,
     },
     /// Position that does not change.
-    #[error("{file}: column `{column}` does not change, record the axis while it moves")]
+    #[error("{file}: column `{column}` is constant: record the axis while it moves")]
     NoMotion {
         /// The log.
         file: String,
@@ -227,7 +227,7 @@ pub enum MotionError {
     },
     /// Torque or force that does not change.
     #[error(
-        "{file}: column `{column}` does not change, and tells nothing of mass and friction: record what really acts"
+        "{file}: column `{column}` is constant and carries no information on mass and friction: record the actual torque or force"
     )]
     NoEffort {
         /// The log.
@@ -237,7 +237,7 @@ pub enum MotionError {
     },
     /// Too few rows are left.
     #[error(
-        "{files}: {rows} rows in motion are left after filtering at {cutoff_hz:.3} Hz and {needed} are needed, \
+        "{files}: {rows} rows in motion remain after filtering at {cutoff_hz:.3} Hz, but {needed} are needed: \
          record a longer motion or at a higher rate"
     )]
     TooShort {
@@ -252,7 +252,7 @@ pub enum MotionError {
     },
     /// No parameter is excited.
     #[error(
-        "{files}: none of the parameters to estimate acts in this motion, record one with changing speed"
+        "{files}: none of the parameters to estimate affects this motion: record one with changing speed"
     )]
     NothingExcited {
         /// The logs.
@@ -260,7 +260,7 @@ pub enum MotionError {
     },
     /// Noise of the speed hides the slow motion that shows the Stribeck curve.
     #[error(
-        "{files}: the position is too noisy to tell the Stribeck curve, record a faster motion or a finer position, \
+        "{files}: the position is too noisy to identify the Stribeck curve: record a faster motion or a finer position, \
          or estimate without static_nm, stribeck_speed_rad_s and stribeck_exponent"
     )]
     StribeckHidden {
@@ -278,7 +278,7 @@ pub enum MotionError {
 /// Coulomb and offset. The Stribeck three and the gravity load are free only when named. Without `known` the
 /// four are always estimated, and naming one of the Stribeck three frees all three.
 ///
-/// `watch` is told the share of the work that is done.
+/// `watch` is told the fraction of the work that is done.
 ///
 /// # Errors
 /// See [`MotionError`].

@@ -6,17 +6,18 @@
 //! - Rows without a finite measured speed are left out.
 //! - A gap of more than ten sample times and 0.1 s ends a dwell: no segment reaches across it.
 //! - Dwells that are too short or whose speed drifts are dropped; a sentence with their time says so.
-//! - Standstill gives no pair: friction at rest has no single value.
+//! - Standstill gives no pair: friction at standstill has no single value.
 //! - The speed of a segment is the slope of the motor angle over time, because the mean of a quantised speed is
 //!   biased; where angle and speed disagree (an angle that wraps), it is the mean of the speed column.
 
 use super::staircase::{Recording, split};
-use super::{FitError, FrictionPair, Motor};
+use super::{FitError, FrictionPair};
+use crate::model::Motor;
 use crate::record::{Log, LogKind};
 
 /// Segments of one dwell.
 const SEGMENTS: usize = 8;
-/// Share of the moving time that a log spends at constant speeds, from which on it counts as such a recording.
+/// Fraction of the moving time that a log spends at constant speeds, from which on it counts as such a recording.
 const CONSTANT_SHARE: f64 = 0.5;
 
 /// A stretch of constant speed.
@@ -44,7 +45,7 @@ pub struct PairSet {
 }
 
 impl PairSet {
-    /// Whether the log is a recording of constant speeds rather than of some other motion.
+    /// Returns whether the log is a recording of constant speeds rather than of some other motion.
     pub fn is_constant_speed(&self) -> bool {
         !self.pairs.is_empty() && self.constant_share >= CONSTANT_SHARE
     }
@@ -55,6 +56,17 @@ impl PairSet {
 ///
 /// # Errors
 /// A log of another kind, or one without a stretch of constant speed.
+///
+/// ```
+/// use flqr_core::identify::pairs_from_log;
+/// use flqr_core::model::Motor;
+/// use flqr_core::record::Log;
+///
+/// let columns = [("speed_rad_s", vec![-1.0, 1.0]), ("torque_nm", vec![-0.2, 0.2])];
+/// let found = pairs_from_log(&Log::from_columns("pairs.csv", columns), Motor::Left)?;
+/// assert_eq!((found.pairs.len(), found.pairs[1].torque_nm), (2, 0.2));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn pairs_from_log(log: &Log, motor: Motor) -> Result<PairSet, FitError> {
     let kind = log.kind()?;
     let required = |name: &str| log.required(kind, name);
@@ -78,7 +90,7 @@ pub fn pairs_from_log(log: &Log, motor: Motor) -> Result<PairSet, FitError> {
     if set.pairs.is_empty() {
         return Err(FitError::NoPairs {
             file: log.source.clone(),
-            reason: set.warnings.first().cloned().unwrap_or_else(|| "the speed never stays".to_owned()),
+            reason: set.warnings.first().cloned().unwrap_or_else(|| "the speed is never constant".to_owned()),
             short_dwells,
             seconds: super::staircase::LEAST_DWELL_S,
         });

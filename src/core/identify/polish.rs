@@ -18,7 +18,7 @@ const LINEAR: [usize; 4] = [COULOMB, STATIC, VISCOUS, OFFSET];
 const GRID: [usize; 2] = [12, 8];
 /// Valleys that are descended.
 const STARTS: usize = 3;
-/// Share of the sum of squares below which a gain is lost in rounding.
+/// Fraction of the sum of squares below which a gain is lost in rounding.
 const ROUNDING: f64 = 1e-12;
 
 /// A candidate with its sum of squared errors, (N m)².
@@ -26,7 +26,7 @@ const ROUNDING: f64 = 1e-12;
 pub(super) struct Fit {
     pub(super) point: Point,
     pub(super) sum: f64,
-    /// Whether no step promises a lower sum.
+    /// True if no step promises a lower sum.
     pub(super) converged: bool,
 }
 

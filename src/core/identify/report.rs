@@ -1,4 +1,4 @@
-//! What a fit found and how far it can be believed.
+//! Result of a fit and its reliability.
 
 use std::collections::BTreeMap;
 
@@ -15,11 +15,11 @@ use crate::record::HealthFinding;
 pub struct Estimate {
     /// Unit in the parameter's key.
     pub value: f64,
-    /// 95 % interval; none where the method gives none or the parameter was not fitted.
+    /// 95 % interval; `None` if the method gives none or the parameter was not fitted.
     pub ci95: Option<[f64; 2]>,
 }
 
-/// Why a search ended.
+/// Reason why a search ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum StopReason {
@@ -50,11 +50,11 @@ pub struct FitReport {
     pub iterations: usize,
     /// Best error after each of the `iterations`, unit as `rmse`.
     pub history: Vec<f64>,
-    /// What is wrong with the logs.
+    /// Problems of the logs.
     pub data_health: Vec<HealthFinding>,
-    /// What to know before believing the parameters.
+    /// Warnings on the reliability of the parameters.
     pub warnings: Vec<String>,
-    /// Why the search ended.
+    /// Reason why the search ended.
     pub stop: StopReason,
 }
 

@@ -1,9 +1,9 @@
-//! Where the searches look: the permissible range [x_min, x_max] of Algorithm 1.
+//! Search range: the permissible range [x_min, x_max] of Algorithm 1.
 
 use super::FrictionPair;
 use super::parameters::{OFFSET, SPEED};
 
-/// A speed below this share of the fastest is standstill.
+/// A speed below this fraction of the fastest is standstill.
 const STANDSTILL: f64 = 1e-9;
 
 /// Which ranges to search.
@@ -62,13 +62,13 @@ impl SearchBox {
         self.upper[d] - self.lower[d]
     }
 
-    /// Whether every coordinate of a point is inside.
+    /// Returns whether every coordinate of a point is inside.
     pub fn contains(&self, point: &[f64; 6]) -> bool {
         (0..6).all(|d| (self.lower[d]..=self.upper[d]).contains(&point[d]))
     }
 }
 
-/// Whether the speeds never change their sign.
+/// Returns whether the speeds never change their sign.
 pub(super) fn one_direction(pairs: &[FrictionPair]) -> bool {
     pairs.iter().all(|p| p.speed_rad_s >= 0.0) || pairs.iter().all(|p| p.speed_rad_s <= 0.0)
 }

@@ -1,6 +1,6 @@
 //! Finds the stretches of constant speed in a log.
 //!
-//! Where the log holds a target speed, its constant stretches are the candidates. Otherwise the measured speed is
+//! If the log contains a target speed, its constant segments are the candidates. Otherwise the measured speed is
 //! averaged over blocks of about 0.05 s and cut where its level changes: the cut set that minimises the squared
 //! deviation from the levels plus a price for each cut (penalised change points, exact by pruned dynamic programming;
 //! Killick, Fearnhead and Eckley 2012). Ramps fall into many short pieces, which are no dwells. The noise that sets
@@ -226,8 +226,8 @@ fn candidates(recording: &Recording, blocks: &Blocks, warnings: &mut Vec<String>
 
 fn too_short(recording: &Recording, rows: &Range<usize>) -> String {
     format!(
-        "the stretch from {:.2} s to {:.2} s ({} samples) is too short for pairs and was left out: {LEAST_DWELL_S} s and \
-         {LEAST_SAMPLES} samples are needed",
+        "the segment from {:.2} s to {:.2} s ({} samples) is too short and was skipped: {LEAST_DWELL_S} s and \
+         {LEAST_SAMPLES} samples are required",
         recording.time[rows.start],
         recording.time[rows.end - 1],
         rows.len()
@@ -251,7 +251,8 @@ fn constant_runs(values: &[f64], rows: Range<usize>) -> Vec<Range<usize>> {
     runs
 }
 
-/// Whether a short piece is a dwell rather than a part of a ramp: its drift is small beside the steps around it.
+/// Returns whether a short piece is a dwell rather than a part of a ramp: its drift is small next to the steps around
+/// it.
 fn is_flat(blocks: &Blocks, levels: &[Level], i: usize) -> bool {
     let Some(neighbours) =
         i.checked_sub(1).and_then(|before| Some((levels.get(before)?, levels.get(i + 1)?)))
@@ -281,7 +282,7 @@ fn settled(blocks: &Blocks, rows: Range<usize>) -> Range<usize> {
     off.map_or(rows.start, |b| blocks.rows_of(&(b..b + 1)).end)..rows.end
 }
 
-/// Whether a candidate is steady once its first and last tenth are gone, and in motion.
+/// Returns whether a candidate is steady once its first and last tenth are gone, and in motion.
 fn keep(recording: &Recording, blocks: &Blocks, rows: &Range<usize>, warnings: &mut Vec<String>) -> bool {
     if !long_enough(recording, rows) {
         warnings.push(too_short(recording, rows));
@@ -305,7 +306,7 @@ fn keep(recording: &Recording, blocks: &Blocks, rows: &Range<usize>, warnings: &
     if !steady {
         warnings.push(format!(
             "the speed is not constant from {:.2} s to {:.2} s (mean {speed:.3}, drift {moved:.3}, standard deviation \
-             {swing:.3} rad/s), the stretch was left out",
+             {swing:.3} rad/s): the segment was skipped",
             recording.time[rows.start],
             recording.time[rows.end - 1]
         ));
@@ -401,7 +402,7 @@ fn drift(values: &[f64]) -> f64 {
     slope(&x, values) * (values.len() - 1) as f64
 }
 
-/// Whether the speed is rather the top of a swing.
+/// Returns whether the speed is rather the top of a swing.
 fn bends(values: &[f64], speed: f64) -> bool {
     bend(values).abs() > (0.06 * speed.abs()).max(2.0 * LEVEL_RAD_S)
 }

@@ -6,6 +6,7 @@ use std::ops::ControlFlow;
 use super::test_data::{Noise, RIGHT, even_pairs};
 use super::*;
 use crate::friction::Stribeck;
+use crate::model::Motor;
 use crate::record::{ColumnMap, Log, ReadOptions, read_log};
 use crate::shared::shared_log;
 
@@ -17,7 +18,7 @@ const SPEED_STEP: f64 = 0.017_453_292_519_943_295;
 #[derive(Clone, Copy)]
 struct Bench {
     sample_s: f64,
-    /// Share of the sample time by which a stamp may be off.
+    /// Fraction of the sample time by which a stamp may be off.
     jitter: f64,
     ramp_rad_s2: f64,
     with_speed: bool,
@@ -55,7 +56,7 @@ fn acceleration(curve: &Stribeck, torque: f64, speed: f64) -> f64 {
     // Friction turns steeply but smoothly through zero, so that the integrator may pass it.
     let direction = (speed / 1e-3).tanh();
     let p = curve.parameters();
-    let friction = curve.level_nm(speed) * direction + p.viscous_nm_s_rad * speed + p.offset_nm;
+    let friction = curve.amplitude_nm(speed) * direction + p.viscous_nm_s_rad * speed + p.offset_nm;
     (torque - friction) / INERTIA
 }
 
@@ -292,17 +293,17 @@ fn names_to_estimate_are_checked_for_constant_speeds() {
     };
     for name in ["nonsense", "inertia_kg_m2", ""] {
         let error = run(&["static_nm", name]).unwrap_err().to_string();
-        let expected = format!("`{name}` is not a parameter that constant speeds give");
+        let expected = format!("`{name}` cannot be estimated from constant speeds");
         assert!(error.starts_with(&expected) && error.contains("coulomb_nm, static_nm"), "{error}");
     }
     let six = &super::parameters::KEYS[..];
     for (names, partly) in [(&["all"][..], false), (&[], false), (six, false), (&["static_nm"], true)] {
         let text = run(names).unwrap().warnings.join("\n");
-        assert_eq!(text.contains("`static_nm` was asked for"), partly, "{names:?}: {text}");
+        assert_eq!(text.contains("`static_nm` was requested"), partly, "{names:?}: {text}");
     }
 }
 
-/// A staircase too short for pairs is fitted as a motion and says why; a motion that is none does not.
+/// A staircase too short for pairs is fitted as a general motion and says why; a motion that is none does not.
 #[test]
 fn a_staircase_that_became_a_motion_says_why() {
     let levels: Vec<(f64, f64)> = both_directions(&[2.0, 6.0, 10.0, 15.0, 9.0, 4.0], 0.3);
@@ -313,7 +314,8 @@ fn a_staircase_that_became_a_motion_says_why() {
         let text = report.warnings.join("\n");
         assert!(report.pairs.is_empty(), "{:?}", report.pairs);
         assert!(
-            text.contains("fitted as a motion: bench.csv: no stretch") && text.contains("0.5 s"),
+            text.contains("fitted as a general motion instead: bench.csv: no segment")
+                && text.contains("0.5 s"),
             "{text}"
         );
     }
@@ -322,13 +324,13 @@ fn a_staircase_that_became_a_motion_says_why() {
     let torque = time.iter().map(|t| -0.005 * 245.0 * (7.0 * t).sin() + 0.05 * (7.0 * t).cos().signum());
     let columns = [("torque_nm", torque.collect()), ("motor_angle_rad", angle), ("time_s", time)];
     let text = run(Log::from_columns("sine.csv", columns)).unwrap().warnings.join("\n");
-    assert!(!text.contains("fitted as a motion"), "{text}");
+    assert!(!text.contains("fitted as a general motion"), "{text}");
 }
 
 #[test]
 fn a_model_of_another_axis_is_refused() {
     let text = "name = \"slide\"\n[axis]\nkind = \"linear\"\nmass_kg = 3.0\n";
-    let model = crate::model_file::Model::from_toml(text, "slide.toml").unwrap();
+    let model = crate::model::Model::from_toml(text, "slide.toml").unwrap();
     let log = record(&[(3.0, 1.0)], BENCH, 1);
     let result =
         fit(&[log], Some(&model), Motor::Left, &FitOptions::default(), &mut |_| ControlFlow::Continue(()));
@@ -348,7 +350,7 @@ fn a_refusal_for_want_of_data_names_the_cells_that_could_not_be_read() {
     };
     assert_eq!(
         refused(std::slice::from_ref(&log)),
-        "the pairs of pairs.csv have 5 distinct speeds and six parameters need at least 6: record more speeds; 3 cells or \
+        "the pairs of pairs.csv have 5 distinct speeds, but six parameters need at least 6: record more speeds; 3 cells or \
          rows of pairs.csv could not be read, `torque_nm` at lines 3, 5, `speed_rad_s` at line 7; correct them there, or \
          record the log again"
     );

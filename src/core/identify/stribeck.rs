@@ -23,6 +23,25 @@ const LARGEST: f64 = 1e6;
 ///
 /// # Errors
 /// Pairs that are not finite or beyond 1e6 rad/s or N m, fewer than six distinct speeds, equal torques, or a `watch` that breaks.
+///
+/// ```
+/// # use flqr_core::friction::{Stribeck, StribeckParameters};
+/// # use flqr_core::identify::FrictionPair;
+/// # let truth = StribeckParameters {
+/// #     coulomb_nm: 0.2, static_nm: 0.3, viscous_nm_s_rad: 0.01, stribeck_speed_rad_s: 1.0, stribeck_exponent: 1.0, offset_nm: 0.0,
+/// # };
+/// # let curve = Stribeck::new(truth)?;
+/// # let speeds = [0.1, 0.3, 1.0, 3.0, 10.0, 30.0].into_iter().flat_map(|speed| [speed, -speed]);
+/// let pairs: Vec<FrictionPair> = speeds
+///     .map(|speed_rad_s| FrictionPair { speed_rad_s, torque_nm: curve.torque_nm(speed_rad_s) })
+///     .collect();
+/// use flqr_core::identify::{FitOptions, fit_pairs};
+///
+/// let options = FitOptions::default();
+/// let fit = fit_pairs(&pairs, "pairs.csv", &options, &mut |_| std::ops::ControlFlow::Continue(()))?;
+/// assert!((fit.parameters["coulomb_nm"].value - 0.2).abs() < 1e-3);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn fit_pairs(
     pairs: &[FrictionPair],
     source: &str,
@@ -43,7 +62,7 @@ pub fn fit_pairs(
     let (fit, intervals) = match options.method {
         Method::Pso => {
             warnings.push(
-                "the swarm alone gives no intervals, its result is not an optimum; use the method `best`"
+                "PSO alone gives no confidence intervals, because its result is not an optimum: use the method `best`"
                     .to_owned(),
             );
             warnings.extend(fit_warnings(&swarm_fit.point, &range, options.bounds, None));
@@ -63,8 +82,8 @@ pub fn fit_pairs(
     };
     if options.method == Method::Best && !fit.converged {
         warnings.push(
-            "the polish ran out of steps before the optimum: the data hardly tell the curves around it apart, record \
-             more speeds"
+            "the local refinement reached its step limit before the optimum: the data barely distinguish the curves around \
+             it, record more speeds"
                 .to_owned(),
         );
     }
@@ -87,6 +106,24 @@ pub fn fit_pairs(
 
 /// The optimum of Eq. 28 over pairs within a box, without the swarm: a coarse grid over v_s and ξ, then variable
 /// projection. Returns the parameters and the RMSE in N m; none where there are no pairs.
+///
+/// ```
+/// # use flqr_core::friction::{Stribeck, StribeckParameters};
+/// # use flqr_core::identify::FrictionPair;
+/// # let truth = StribeckParameters {
+/// #     coulomb_nm: 0.2, static_nm: 0.3, viscous_nm_s_rad: 0.01, stribeck_speed_rad_s: 1.0, stribeck_exponent: 1.0, offset_nm: 0.0,
+/// # };
+/// # let curve = Stribeck::new(truth)?;
+/// # let speeds = [0.1, 0.3, 1.0, 3.0, 10.0, 30.0].into_iter().flat_map(|speed| [speed, -speed]);
+/// let pairs: Vec<FrictionPair> = speeds
+///     .map(|speed_rad_s| FrictionPair { speed_rad_s, torque_nm: curve.torque_nm(speed_rad_s) })
+///     .collect();
+/// use flqr_core::identify::{SearchBox, polish_pairs};
+///
+/// let (parameters, error_nm) = polish_pairs(&pairs, &SearchBox::from_pairs(&pairs)).ok_or("no pairs")?;
+/// assert!((parameters.static_nm - 0.3).abs() < 1e-3 && error_nm < 1e-6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn polish_pairs(pairs: &[FrictionPair], range: &SearchBox) -> Option<(StribeckParameters, f64)> {
     let samples = Samples::new(pairs);
     (samples.len() > 0).then(|| {
@@ -154,7 +191,7 @@ fn failed_bounds(samples: &Samples, pairs: &[FrictionPair], fit: &Fit, bounds: B
     let (paper, data) = (samples.rmse(fit.sum), samples.rmse(free.sum));
     (paper > 1.01 * data).then(|| {
         format!(
-            "the paper's bounds leave an error of {paper:.2e} N m, bounds from the data {data:.2e} N m: Table 3 \
+            "the error is {paper:.2e} N m with the paper's bounds and {data:.2e} N m with bounds from the data: Table 3 \
              excludes the optimum, whose `viscous_nm_s_rad` is {:.2e}",
             free.point[VISCOUS]
         )

@@ -34,7 +34,7 @@ fn geometric_speeds(count: i32) -> impl Iterator<Item = f64> {
     })
 }
 
-/// Least RMSE for given v_s and ξ by a singular value decomposition; none where f_c, f_s or f_v comes out negative.
+/// Least RMSE for given v_s and ξ by a singular value decomposition; `None` if f_c, f_s or f_v comes out negative.
 fn linear_rmse(pairs: &[FrictionPair], log_speed: f64, log_exponent: f64) -> Option<f64> {
     let fade = |q: f64| (-(q.abs() / log_speed.exp()).powf(log_exponent.exp())).exp();
     let matrix = DMatrix::from_fn(pairs.len(), 4, |i, j| {
@@ -149,7 +149,7 @@ fn the_paper_s_bounds_fail_and_say_so() {
         assert!(report.rmse > 0.25, "{}", report.rmse);
         assert!(text.contains("Table 3 excludes the optimum"), "{text}");
         assert_eq!(
-            text.contains("`viscous_nm_s_rad` = 1.000e-2 sits on the lower end"),
+            text.contains("`viscous_nm_s_rad` = 1.000e-2 is at the lower end"),
             method == Method::Best,
             "{text}"
         );
@@ -177,14 +177,14 @@ fn what_the_pairs_leave_open_is_said() {
         report
     };
     check(geometric_speeds(40).collect(), None);
-    let one_way = check(geometric_speeds(40).filter(|q| *q > 0.0).collect(), Some("one direction"));
+    let one_way = check(geometric_speeds(40).filter(|q| *q > 0.0).collect(), Some("the same direction"));
     assert_eq!(one_way.parameters["offset_nm"], Estimate { value: 0.0, ci95: None });
     assert!((one_way.parameters["coulomb_nm"].value - 0.054).abs() < 0.001);
     assert!(one_way.warnings.join("\n").contains("and is set to 0"), "{:?}", one_way.warnings);
     let pairs = pairs_at(&SHARP, geometric_speeds(40).filter(|q| *q > 0.0), 1e-4, 2);
     let paper = fit_pairs(&pairs, "made up", &options(Method::Pso, Bounds::Paper, 1), &mut go_on).unwrap();
     let text = paper.warnings.join("\n");
-    assert!(text.contains("share what was measured") && !text.contains("is set to 0"), "{text}");
+    assert!(text.contains("only their sum is identified") && !text.contains("is set to 0"), "{text}");
     check(geometric_speeds(40).filter(|q| q.abs() > 0.5).collect(), Some("none is below 0.2 rad/s"));
     check(geometric_speeds(5).collect(), Some("only 5 distinct speeds"));
 }
@@ -204,7 +204,7 @@ fn useless_pairs_are_refused_with_the_mend() {
         (broken, "a.csv: pair 4 has the value NaN in `torque_nm`"),
         (vec![], "have 0 distinct speeds"),
         (vec![pair(5.0, 0.1); 8], "all 8 pairs of a.csv are at one speed, 5.000 rad/s"),
-        (even_pairs(&LEFT, 5, 0.0, 1), "have 5 distinct speeds and six parameters need at least 6"),
+        (even_pairs(&LEFT, 5, 0.0, 1), "have 5 distinct speeds, but six parameters need at least 6"),
         ((0..9).map(|i| pair(f64::from(i), 0.3)).collect(), "torques of a.csv are all 0.3 N m"),
     ] {
         let error = fit_pairs(&pairs, "a.csv", &FitOptions::default(), &mut go_on).unwrap_err();
@@ -237,7 +237,7 @@ fn a_polish_that_runs_out_of_steps_says_so() {
     for (bounds, stop) in [(Bounds::Data, StopReason::Converged), (Bounds::Paper, StopReason::MaxIterations)]
     {
         let report = fit_pairs(&pairs, "made up", &options(Method::Best, bounds, 1), &mut go_on).unwrap();
-        let said = report.warnings.iter().any(|warning| warning.contains("ran out of steps"));
+        let said = report.warnings.iter().any(|warning| warning.contains("reached its step limit"));
         assert_eq!((report.stop, said), (stop, stop != StopReason::Converged), "{:?}", report.warnings);
     }
     // Six speeds are met exactly: there is nothing left to gain.

@@ -21,9 +21,9 @@ pub struct PsoSettings {
     pub inertia_start: f64,
     /// ω_e, inertia at the end.
     pub inertia_end: f64,
-    /// α, share of the velocity that a position moves by.
+    /// α, fraction of the velocity that a position moves by.
     pub constraint_factor: f64,
-    /// Largest velocity of a parameter as a share of its range. The paper prints 0.5 without a unit; an absolute
+    /// Largest velocity of a parameter as a fraction of its range. The paper prints 0.5 without a unit; an absolute
     /// 0.5 would be no limit at all for f_v and a severe one for v_s, and only the relative reading keeps the rule
     /// "restore, invert, move again" inside of the range: α · 0.5 = 0.3 of it is less than half.
     pub velocity_limit: f64,
@@ -67,6 +67,26 @@ pub struct PsoProgress {
 /// k₁, k₂ in [0, 1); ω = ω_e + (ω_s − ω_e)(T − t)/T (Eq. 42). A coordinate that would leave its range goes back,
 /// inverts its velocity and moves again. p follows within the iteration, g after it, as Algorithm 1 has it. The
 /// fitness is 1/error (Eq. 40), so the smaller error wins. Same pairs, box, settings and seed: same bytes.
+///
+/// ```
+/// # use flqr_core::friction::{Stribeck, StribeckParameters};
+/// # use flqr_core::identify::FrictionPair;
+/// # let truth = StribeckParameters {
+/// #     coulomb_nm: 0.2, static_nm: 0.3, viscous_nm_s_rad: 0.01, stribeck_speed_rad_s: 1.0, stribeck_exponent: 1.0, offset_nm: 0.0,
+/// # };
+/// # let curve = Stribeck::new(truth)?;
+/// # let speeds = [0.1, 0.3, 1.0, 3.0, 10.0, 30.0].into_iter().flat_map(|speed| [speed, -speed]);
+/// let pairs: Vec<FrictionPair> = speeds
+///     .map(|speed_rad_s| FrictionPair { speed_rad_s, torque_nm: curve.torque_nm(speed_rad_s) })
+///     .collect();
+/// use flqr_core::identify::{Pso, PsoSettings, SearchBox};
+///
+/// let range = SearchBox::from_pairs(&pairs);
+/// let errors: Vec<f64> =
+///     Pso::new(&pairs, range, PsoSettings::default(), 1).take(50).map(|progress| progress.best_error_nm).collect();
+/// assert!(errors.is_sorted_by(|earlier, later| later <= earlier));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Pso {
     samples: Samples,
@@ -130,7 +150,7 @@ impl Pso {
         }
     }
 
-    /// Whether the search ended because the error stayed below the threshold.
+    /// Returns whether the search ended because the error stayed below the threshold.
     pub fn reached_threshold(&self) -> bool {
         self.below_threshold >= 2
     }
@@ -257,7 +277,7 @@ mod tests {
         assert_ne!(history(7), history(8));
     }
 
-    /// The sum that a particle is judged by must be the sum over Eq. 28, also where it was given up early.
+    /// The sum that a particle is assessed by must be the sum over Eq. 28, also where it was given up early.
     #[test]
     fn the_best_error_is_that_of_the_curve() {
         let pairs = even_pairs(&LEFT, 60, 0.002, 1);

@@ -38,13 +38,15 @@ pub enum BusError {
         reason: String,
     },
     /// Frames are handed over faster than they leave.
-    #[error("{name} takes no more frames: its queue is full; is anything on the bus that acknowledges them?")]
+    #[error(
+        "{name} accepts no more frames: its queue is full; check that a node on the bus acknowledges them"
+    )]
     Full {
         /// Interface or port.
         name: String,
     },
     /// A bus that only listens.
-    #[error("{name} only listens: it was opened without leave to send")]
+    #[error("{name} is listen-only: it was opened without permission to send")]
     ListensOnly {
         /// Interface or port.
         name: String,

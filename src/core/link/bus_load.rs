@@ -11,6 +11,14 @@ const POLYNOMIAL: u16 = 0x4599;
 
 /// Bits that a frame takes on the bus, stuff bits and the pause after it included (ISO 11898-1): 111 to 135 of a
 /// standard frame of 8 bytes. An error frame is a report of the interface and takes none.
+///
+/// ```
+/// use flqr_core::link::{Frame, FrameId, bus_load};
+///
+/// let id = FrameId::standard(0x141).ok_or("not a standard identifier")?;
+/// assert!((111..=135).contains(&bus_load::bits(&Frame::full(id, [0x55; 8]))));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn bits(frame: &Frame) -> u32 {
     let mut line = Line::default();
     let remote = match frame.kind() {

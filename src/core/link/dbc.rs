@@ -61,6 +61,18 @@ impl Dbc {
     ///
     /// # Errors
     /// [`DbcError`].
+    ///
+    /// ```
+    /// use flqr_core::link::Frame;
+    /// use flqr_core::link::dbc::Dbc;
+    ///
+    /// let text = "VERSION \"\"\nNS_ :\nBS_:\nBU_:\nBO_ 256 Body: 8 Vector__XXX\n SG_ Pitch : 0|16@1- (0.01,0) [0|0] \"deg\" Vector__XXX\n";
+    /// let dbc = Dbc::parse(text)?;
+    /// let [message] = dbc.messages() else { return Err("not one message".into()) };
+    /// let frame = Frame::full(message.id, [100, 0, 0, 0, 0, 0, 0, 0]);
+    /// assert_eq!(message.values(&frame).map(|(_, value)| value).collect::<Vec<_>>(), [1.0]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn parse(text: &str) -> Result<Self, DbcError> {
         if text.len() > LARGEST_FILE_BYTES {
             return Err(DbcError::TooLarge { bytes: text.len() });

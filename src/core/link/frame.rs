@@ -53,11 +53,21 @@ pub struct Frame {
 
 impl Frame {
     /// A data frame; none where there are more than 8 bytes.
+    ///
+    /// ```
+    /// use flqr_core::link::{Frame, FrameId};
+    ///
+    /// let id = FrameId::standard(0x141).ok_or("not a standard identifier")?;
+    /// let frame = Frame::data(id, &[0x9C, 0, 0, 0, 0, 0, 0, 0]).ok_or("too many bytes")?;
+    /// assert_eq!((frame.id().raw(), frame.length()), (0x141, 8));
+    /// assert_eq!(Frame::data(id, &[0; 9]), None);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn data(id: FrameId, data: &[u8]) -> Option<Self> {
         Self::of(id, FrameKind::Data, data)
     }
 
-    /// A remote frame; none where the length is above 8.
+    /// A remote frame; `None` if the length is above 8.
     pub fn remote(id: FrameId, length: u8) -> Option<Self> {
         (length <= 8).then_some(Self { id, kind: FrameKind::Remote, length, bytes: [0; 8] })
     }

@@ -12,7 +12,7 @@ const STIFFNESS: f64 = 500.0;
 const DAMPING: f64 = 5.0;
 
 /// A frame to or from a joint. Fields are raw; drivers disagree on the span of torque (±18 or ±35), so that it is
-/// an argument where torque is asked for.
+/// an argument where torque is requested.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JointFrame {
     /// What a joint is to do.

@@ -3,12 +3,12 @@
 use std::time::Duration;
 
 use super::jy901::{Kind, Packet, Reading};
-use crate::robot::{LinkSettings, PitchAxis};
+use crate::model::{LinkSettings, PitchAxis};
 
 /// One reading of the IMU.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImuReading {
-    /// When its last byte was heard.
+    /// When its last byte was received.
     pub time: Duration,
     /// Pitch, forward positive, rad.
     pub pitch_rad: f64,
@@ -59,7 +59,7 @@ impl ImuAssembler {
         }
     }
 
-    /// Takes in a packet and when its last byte was heard; gives a reading where it completes one.
+    /// Takes in a packet and when its last byte was received; gives a reading where it completes one.
     pub fn push(&mut self, time: Duration, packet: &Packet) -> Option<ImuReading> {
         if !matches!(packet.kind, Kind::Acceleration | Kind::Rate | Kind::Angle) {
             return None;
@@ -111,7 +111,7 @@ impl ImuAssembler {
         }
     }
 
-    /// Roll or pitch of an IMU at rest, whose acceleration points up (angles in the order z-y-x).
+    /// Roll or pitch of an IMU at standstill, whose acceleration points up (angles in the order z-y-x).
     fn tilt_rad(&self, [x, y, z]: [f64; 3]) -> f64 {
         match self.axis {
             PitchAxis::Roll => y.atan2(z),
@@ -123,7 +123,7 @@ impl ImuAssembler {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::robot::Turn;
+    use crate::model::Turn;
 
     const ACCELERATION: [f64; 3] = [0.0, 0.0, 1.0];
 

@@ -7,25 +7,17 @@ mod bus;
 pub mod bus_load;
 pub mod candump;
 pub mod dbc;
-mod emulator;
-mod faulty;
 mod frame;
 pub mod ht8115;
 mod imu;
 pub mod jy901;
 pub mod lk;
-mod loopback;
 mod motors;
 pub mod slcan;
 mod wheels;
 
 pub use bus::{Bus, BusError};
-pub use emulator::{
-    EmulatedAdapter, EmulatedBus, Emulator, EmulatorSettings, Fault, FaultError, Place, TimedFault,
-};
-pub use faulty::{FaultCounts, FaultRates, Faulty};
 pub use frame::{Direction, Frame, FrameId, FrameKind, StampedFrame};
 pub use imu::{ImuAssembler, ImuReading};
-pub use loopback::Loopback;
 pub use motors::{MotorErrors, MotorEvent, MotorHealth, MotorOrder, MotorState};
 pub use wheels::{LONGEST_SILENCE, Wheels};

@@ -3,9 +3,9 @@
 use std::fmt;
 use std::time::Duration;
 
-use crate::robot::Motor;
+use crate::model::Motor;
 
-/// What is asked of both motors.
+/// What is required of both motors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MotorOrder {
     /// Put power on.
@@ -25,7 +25,7 @@ pub enum MotorOrder {
 /// What a motor says of its motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotorState {
-    /// When it was heard.
+    /// When it was received.
     pub time: Duration,
     /// Angle since the first reading, turns counted, rad.
     pub angle_rad: f64,
@@ -40,7 +40,7 @@ pub struct MotorState {
 /// What a motor says of itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotorHealth {
-    /// When it was heard.
+    /// When it was received.
     pub time: Duration,
     /// Temperature, °C.
     pub temperature_c: f64,
@@ -96,21 +96,21 @@ impl fmt::Display for MotorErrors {
     }
 }
 
-/// What was heard on the bus about a motor.
+/// What was received on the bus about a motor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MotorEvent {
     /// A reading of its motion.
     State(Motor, MotorState),
     /// A reading of its health.
     Health(Motor, MotorHealth),
-    /// It has done what command byte says: switched on or off, for instance.
-    Acknowledged {
+    /// The motor acknowledges that it is switched on or off.
+    Switched {
         /// Which.
         motor: Motor,
         /// When.
         time: Duration,
-        /// Command byte.
-        command: u8,
+        /// Whether it is on.
+        on: bool,
     },
     /// A command to it that is no query and that this program did not send: another controller is on the bus.
     Commanded {
@@ -128,9 +128,9 @@ pub enum MotorEvent {
     TurnsLost {
         /// Which.
         motor: Motor,
-        /// When it was heard again.
+        /// When it was received again.
         time: Duration,
-        /// For how long it was not heard.
+        /// For how long it was not received.
         silent: Duration,
     },
 }

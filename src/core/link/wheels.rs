@@ -1,4 +1,4 @@
-//! The two wheel motors on the bus: orders to frames, frames to what was heard, with the settings of the robot.
+//! The two wheel motors on the bus: orders to frames, frames to what was received, with the settings of the robot.
 
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use super::lk::{self, Address, Command, MAX_IQ, MotorId, Reply, State1, State2, TORQUES_ID};
 use super::{Direction, Frame, MotorEvent, MotorHealth, MotorOrder, MotorState, StampedFrame};
-use crate::robot::{LinkSettings, Motor, TorqueCommand};
+use crate::model::{LinkSettings, Motor, TorqueCommand};
 
 /// The longest silence over which turns are counted: a motor of at most 490 rpm (Table 1) stays within half a
 /// turn of where its speeds before and after say that it is, whatever it does in between.
@@ -29,7 +29,7 @@ const RAD_S_PER_DPS: f64 = TAU / 360.0;
 /// Many firmwares answer on the identifier of the command, so a watcher has to tell the two apart. A frame is a
 /// reply where a command of that code cannot have its bytes: commands leave bytes at 0 that replies fill with
 /// temperature, current and encoder. What could be both is a reply only if a command of the same code was sent or
-/// heard within 50 ms and not answered yet; and if it states a temperature, also only if that is within 2 °C of
+/// received within 50 ms and not answered yet; and if it states a temperature, also only if that is within 2 °C of
 /// the last one (or the command was our own and none is known). What can go wrong: on/off and the like, whose
 /// replies are plain echoes, are taken for acknowledged by a repetition of the command after a lost reply; and a
 /// torque command to a motor at 0 °C after a lost reply can be taken for a reading of encoder 0. Neither can
@@ -38,7 +38,7 @@ const RAD_S_PER_DPS: f64 = TAU / 360.0;
 /// # Commands of another controller
 /// Every command that this program did not send is one, but for three kinds of frames:
 /// - echoes: some adapters return what they send. An echo has the bytes of a command sent within 50 ms, and each
-///   command has one. Queries show it: no reply has their bytes. Until an echoed query is heard, a command that
+///   command has one. Queries show it: no reply has their bytes. Until an echoed query is received, a command that
 ///   moves a motor is another controller's even if it has the bytes of one of ours;
 /// - the reply to an on or off command that comes twice;
 /// - replies with a damaged command byte, which CAN's checksum rules out but a serial line does not: one bit off the
@@ -61,7 +61,7 @@ struct Wheel {
     answers_apart: bool,
     /// The newest command of each code.
     unanswered: Vec<Unanswered>,
-    /// Commands that this program sent within the time of a reply and whose echo was not heard, oldest first.
+    /// Commands that this program sent within the time of a reply and whose echo was not received, oldest first.
     sent: VecDeque<Sent>,
     /// Whether commands of this program come back.
     echoes: bool,
@@ -96,7 +96,7 @@ struct Shaft {
 
 impl Wheels {
     /// The motors of these settings, which are to be ones that [`LinkSettings::validate`] accepts: a motor whose
-    /// number does not exist is neither heard nor asked.
+    /// number does not exist is neither received nor asked.
     pub fn new(settings: &LinkSettings) -> Self {
         let wheel = |motor: Motor| Wheel {
             motor,
@@ -302,13 +302,20 @@ impl Wheel {
             Reply::State1 { state, .. } => {
                 Some([Some(MotorEvent::Health(motor, health(&state, time, round_trip))), None])
             }
-            Reply::Echo { bytes: [command, ..] } | Reply::Offset { command, .. } => {
-                Some([Some(MotorEvent::Acknowledged { motor, time, command }), None])
+            Reply::Echo { bytes } => {
+                let on = match Command::decode(bytes)? {
+                    Command::On => true,
+                    Command::Off => false,
+                    _ => return None,
+                };
+                Some([Some(MotorEvent::Switched { motor, time, on }), None])
             }
-            Reply::Brake { .. } => {
-                Some([Some(MotorEvent::Acknowledged { motor, time, command: 0x8C }), None])
-            }
-            Reply::State3(_) | Reply::Encoder(_) | Reply::Angle { .. } | Reply::TurnAngle { .. } => None,
+            Reply::Brake { .. }
+            | Reply::Offset { .. }
+            | Reply::State3(_)
+            | Reply::Encoder(_)
+            | Reply::Angle { .. }
+            | Reply::TurnAngle { .. } => None,
         }
     }
 

@@ -13,7 +13,7 @@ use super::real::Real;
 use super::search::find;
 use super::square::{Square, SquareN};
 
-/// How the quadratic term of the equation is given.
+/// Quadratic term of the equation.
 #[derive(Clone, Copy, Debug)]
 pub enum CareInput<'a> {
     /// G = B R⁻¹ Bᵀ, formed in twice the precision of a double, so that R may be nearly singular.
@@ -42,7 +42,7 @@ pub struct CareSolution {
     /// ‖AᵀP + PA − PGP + Q‖_F / ‖P‖_F of the returned P (of ‖Q‖_F alone where P = 0), itself evaluated in
     /// twice the precision of a double.
     pub relative_residual: f64,
-    /// What to know before P is used: poles on the imaginary axis, digits lost to bad condition.
+    /// Warnings on P: poles on the imaginary axis, digits lost to bad condition.
     pub warnings: Vec<String>,
 }
 
@@ -127,7 +127,8 @@ impl CareSolution {
     }
 }
 
-/// Largest entry of a balanced equation of which products of three, squared for their norms, are in the range of doubles.
+/// Largest entry of a balanced equation of which products of three, squared for their norms, are in the range of
+/// doubles.
 const LARGEST_ENTRY: f64 = 1e50;
 
 /// Decimal exponent of an entry beyond which such products leave that range.
@@ -160,7 +161,7 @@ impl Extreme {
     }
 }
 
-/// The entry that is farthest from 1; none where all are zero.
+/// The entry that is farthest from 1; `None` if all are zero.
 fn extreme_entry(a: &DMatrix<f64>, q: &DMatrix<f64>, input: CareInput) -> Option<Extreme> {
     let of_input = match input {
         CareInput::Weighted { b, r } => [("b", b), ("r", r)],

@@ -1,4 +1,4 @@
-//! What a matrix must be before it is solved for: shape, finite entries, symmetry.
+//! Checks of matrices before solving: shape, finite entries, symmetry.
 
 use nalgebra::{DMatrix, Dim, Matrix, RawStorage};
 

@@ -11,8 +11,8 @@ use super::error::{CareError, DesignError};
 use super::newton::lyapunov;
 use super::poles::eigenvalues;
 use super::square::{Square, Square4};
-use super::weights::Weights;
-use crate::robot::LinearModel;
+use crate::model::LinearModel;
+use crate::model::Weights;
 
 /// Gain, cost and closed loop of u = −K X (Eqs. 13, 24, 25).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,14 +33,14 @@ const SEMIDEFINITE_TOLERANCE: f64 = 1e-14;
 const WELL_CONDITIONED: f64 = 1e-3;
 /// Residual, relative to P, above which the quick path gives way to the thorough one.
 const QUICK_RESIDUAL: f64 = 1e-13;
-/// The same for the relative error of P.
+/// Threshold for the relative error of P.
 const QUICK_ERROR: f64 = 1e-12;
 /// Relative size of the Newton step whose square is below every other error.
 const QUICK_CORRECTION: f64 = 1e-7;
 /// Distance to the imaginary axis, relative to the norm of A, below which the quick path cannot be sure of a
 /// pole's side.
 const DOUBTFUL: f64 = 1e-11;
-/// The same, below which a pole counts as on the axis.
+/// Threshold below which a pole counts as on the axis.
 const ON_AXIS: f64 = 1e-13;
 /// The states as the model file and the window name them.
 const STATES: [&str; 4] = ["x", "x_dot", "pitch", "pitch_rate"];
@@ -59,6 +59,15 @@ const STATES: [&str; 4] = ["x", "x_dot", "pitch", "pitch_rate"];
 /// # Method
 /// Structure-preserving doubling and one Newton step on the stack; where the outcome is not good to rounding,
 /// [`solve_care`] takes over.
+///
+/// ```
+/// let model = flqr_core::model_file::presets::paper();
+/// let robot = model.robot().ok_or("no robot")?;
+/// let weights = robot.weights.ok_or("no weights")?;
+/// let design = flqr_core::lqr::design(&robot.parameters.linear_model(), &weights)?;
+/// assert!(design.poles.iter().all(|pole| pole.re < 0.0) && design.riccati_residual < 1e-12);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn design(model: &LinearModel, weights: &Weights) -> Result<LqrDesign, DesignError> {
     check(model, weights)?;
     if let Some(design) = Arch::new().dispatch(Quick { model, weights }) {

@@ -24,7 +24,7 @@ pub(super) struct LostMode {
     pub(super) direction: DVector<Complex<f64>>,
 }
 
-/// Why `equation` has no stabilising solution.
+/// Returns the reason why `equation` has no stabilising solution.
 pub(super) fn cause<T: Real>(equation: &Riccati<SquareN<T>>) -> CareError {
     let [a, g, q] = [&equation.a, &equation.g, &equation.q].map(to_dmatrix);
     if let Some(mode) = lost_mode(&a.transpose(), &g) {

@@ -1,8 +1,8 @@
-//! What throws a robot off, as the state that it leaves behind.
+//! Disturbances of a robot, as the state that they cause.
 
-use crate::robot::{RobotParameters, State};
+use crate::model::{RobotParameters, State};
 
-/// Something sudden that happens to a robot that stands upright at rest at its place.
+/// Something sudden that happens to a robot that stands upright at standstill at its place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Disturbance {
     /// A horizontal blow to the body's centre of mass, forward positive, N s.
@@ -16,6 +16,16 @@ pub enum Disturbance {
 impl Disturbance {
     /// The state right after it, x counted from where the robot is to stand. A kick sets wheels and body in
     /// motion at once, without slip and without time for the motors to answer.
+    ///
+    /// ```
+    /// # let model = flqr_core::model_file::presets::paper();
+    /// # let robot = model.robot().ok_or("no robot")?;
+    /// use flqr_core::lqr::Disturbance;
+    ///
+    /// let kick = Disturbance::Kick(3.0).state(&robot.parameters);
+    /// assert!(kick.x_dot_m_s > 0.0 && kick.x_m == 0.0);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn state(&self, robot: &RobotParameters) -> State {
         match *self {
             Self::Kick(impulse_n_s) => {
@@ -37,7 +47,7 @@ impl Disturbance {
         }
     }
 
-    /// The same kind of disturbance in another size.
+    /// Returns the disturbance with another size.
     pub fn of_size(&self, size: f64) -> Self {
         match self {
             Self::Kick(_) => Self::Kick(size),

@@ -1,9 +1,9 @@
-//! Why a Riccati equation or a design was refused.
+//! Errors of Riccati equations and designs.
 
 use nalgebra::Complex;
 use thiserror::Error;
 
-/// Why [`solve_care`](super::solve_care) returns no P. Rows and columns count from 1.
+/// Reason why [`solve_care`](super::solve_care) returns no P. Rows and columns count from 1.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum CareError {
     /// A is 0×0.
@@ -26,11 +26,11 @@ pub enum CareError {
     #[expect(missing_docs, reason = "named as what they are")]
     NotSymmetric { matrix: &'static str, row: usize, column: usize, upper: f64, lower: f64 },
     /// R is singular to rounding, indefinite or negative.
-    #[error("matrix r is not positive definite: every direction of the inputs must cost something")]
+    #[error("matrix r is not positive definite: every combination of inputs must have a positive cost")]
     RNotPositiveDefinite,
     /// A mode that no input reaches does not die out.
     #[error(
-        "not stabilisable: no input reaches the mode at {} of a, which does not die out by itself",
+        "not stabilisable: the unstable mode of a at {} is not controllable: check a and b",
         text(eigenvalue)
     )]
     NotStabilisable {
@@ -39,7 +39,7 @@ pub enum CareError {
     },
     /// A mode on or right of the imaginary axis costs nothing.
     #[error(
-        "not detectable: the mode at {} of a does not die out and costs nothing: give its states a weight in q",
+        "not detectable: the mode of a at {} is not asymptotically stable and has no cost: give its states a weight in q",
         text(eigenvalue)
     )]
     NotDetectable {
@@ -48,8 +48,8 @@ pub enum CareError {
     },
     /// The Hamiltonian matrix has eigenvalues on the imaginary axis and no P bounds them.
     #[error(
-        "no stabilising solution: the Hamiltonian matrix has an eigenvalue at {}, on the imaginary axis to \
-         rounding: change q",
+        "no stabilising solution: the Hamiltonian matrix has an eigenvalue at {}, on the imaginary axis \
+         within rounding: change q",
         text(eigenvalue)
     )]
     NoSolution {
@@ -58,13 +58,13 @@ pub enum CareError {
     },
     /// The condition leaves no digit.
     #[error(
-        "no solution found: the equation is too ill-conditioned for 32 digits, so scale or reduce the model"
+        "no solution found: the equation is too ill-conditioned for 32 digits: scale or reduce the model"
     )]
     IllConditioned,
     /// Numbers so far apart that products of them leave the range of doubles.
     #[error(
-        "matrix {matrix} has an entry of {value:.0e}, too far from the others for double precision: choose other units \
-         for the states, the inputs or the cost"
+        "matrix {matrix} has an entry of {value:.0e}, too large or too small compared with the others for double precision: choose \
+         other units for the states, the inputs or the cost"
     )]
     TooFarApart {
         /// The matrix with the most extreme entry.
@@ -73,24 +73,24 @@ pub enum CareError {
         value: f64,
     },
     /// P exists but does not fit a double.
-    #[error("the solution is out of the range of doubles: choose other units for the states or the cost")]
+    #[error(
+        "the solution exceeds the range of double precision: choose other units for the states or the cost"
+    )]
     OutOfRange,
 }
 
-/// Why [`design`](super::design) returns no gain.
+/// Reason why [`design`](super::design) returns no gain.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum DesignError {
     /// The matrices are not fit for a Riccati equation, or it has no solution.
     #[error(transparent)]
     Equation(#[from] CareError),
     /// Q would reward some state.
-    #[error(
-        "matrix q is not positive semidefinite: no state and no combination of states may cost less than 0"
-    )]
+    #[error("matrix q is not positive semidefinite: no combination of states may have a negative cost")]
     QNotPositiveSemidefinite,
     /// A mode on or right of the imaginary axis costs nothing.
     #[error(
-        "not detectable: the mode at {} does not die out and costs nothing: give {state} a weight above 0",
+        "not detectable: the mode at {} is not asymptotically stable and has no cost: give {state} a weight above 0",
         text(eigenvalue)
     )]
     NotDetectable {
@@ -101,7 +101,7 @@ pub enum DesignError {
     },
     /// The closed loop would not come to rest.
     #[error(
-        "the closed loop has a pole at {}, which does not die out: raise the weights in q against those in r",
+        "the closed loop has a pole at {}, which is not asymptotically stable: raise the weights in q relative to those in r",
         text(pole)
     )]
     NotStable {

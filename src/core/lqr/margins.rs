@@ -1,10 +1,9 @@
-//! How much gain, phase and delay the loop bears as it runs: sampled, delayed, with a held IMU.
+//! Gain, phase and delay margins of the sampled loop: sampled, delayed, with a held IMU.
 
 use nalgebra::{Complex, Matrix2x4};
 
 use super::sampled_loop::{ContinuousLoop, SampledSystem};
-use crate::model_file::RobotModel;
-use crate::robot::{LinearModel, TICK_S};
+use crate::model::{LinearModel, RobotModel, TICK_S};
 
 /// When the controller measures and acts.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,12 +20,12 @@ pub struct SampledLoop {
     pub wheel_radius_m: f64,
 }
 
-/// What the sampled loop bears before it becomes unstable, broken at the plant's input, both motors together.
+/// Stability margins of the sampled loop, broken at the plant input, both motors together.
 ///
-/// Where it is unstable already, both factors are 1 and the other margins 0.
+/// For an unstable loop, both factors are 1 and the other margins 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Margins {
-    /// Whether every eigenvalue of the closed loop over one IMU period lies inside of the unit circle.
+    /// True if every eigenvalue of the closed loop over one IMU period lies inside of the unit circle.
     pub stable: bool,
     /// Least factor above 1 of all gains (or of the motors' torque per command) that makes it unstable; infinite
     /// where none does.
@@ -42,7 +41,7 @@ pub struct Margins {
     /// Frequency at which the loop oscillates at `gain_up`, rad/s, half the IMU's rate at most; 0 where it is
     /// infinite.
     pub gain_up_rad_s: f64,
-    /// The same at `gain_down`.
+    /// Frequency at `gain_down`.
     pub gain_down_rad_s: f64,
 }
 
@@ -54,9 +53,9 @@ const LONGEST_HOLD: f64 = 256.0;
 const LOWEST_RAD_S: f64 = 1e-3;
 /// Frequencies of the search in each decade.
 const PER_DECADE: f64 = 24.0;
-/// Share of half the IMU's rate from which on the folded frequencies count in the search.
+/// Fraction of half the IMU's rate from which on the folded frequencies count in the search.
 const FOLDING: f64 = 0.1;
-/// Share of half the IMU's rate from which on a loop counts as one that alternates.
+/// Fraction of half the IMU's rate from which on a loop counts as one that alternates.
 const ALTERNATING: f64 = 0.9;
 /// Factor up to which it is next to doing so, and frequencies may miss a delay that makes it.
 const NEAR: f64 = 4.0;
@@ -83,6 +82,18 @@ const UNSTABLE: Margins = Margins {
 /// IMU. Friction, limits and noise are not in it. A loop with more than 64 ticks of delay counts as unstable
 /// where any lesser delay makes it so, and so does one whose IMU period or latency reaches 256 ticks, whose
 /// tick is not above 0, or that has a number that is not finite.
+///
+/// ```
+/// # let model = flqr_core::model_file::presets::paper();
+/// # let robot = model.robot().ok_or("no robot")?;
+/// # let linear = robot.parameters.linear_model();
+/// # let gain = flqr_core::lqr::design(&linear, &robot.weights.ok_or("no weights")?)?.gain;
+/// use flqr_core::lqr::{SampledLoop, margins};
+///
+/// let margins = margins(&linear, &gain, &SampledLoop::of(robot));
+/// assert!(margins.stable && margins.phase_rad.to_degrees() > 40.0 && margins.delay_s > 0.03);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn margins(model: &LinearModel, gain: &Matrix2x4<f64>, timing: &SampledLoop) -> Margins {
     if !timing.is_within_reach() {
         return UNSTABLE;
@@ -111,7 +122,7 @@ impl SampledLoop {
         }
     }
 
-    /// Whether the eigenvalues of the loop are computed, in a time that a frame has.
+    /// Returns whether the eigenvalues of the loop are computed, in a time that a frame has.
     pub(super) fn is_analysed(&self) -> bool {
         self.is_within_reach() && self.delay_s <= LONGEST_QUEUE * self.tick_s
     }
@@ -125,7 +136,7 @@ impl SampledLoop {
     }
 }
 
-/// The loop of one design, with more delay where it is asked for.
+/// The loop of one design, with more delay where it is requested.
 pub(super) struct Analysis {
     continuous: ContinuousLoop,
     timing: SampledLoop,
@@ -138,7 +149,7 @@ struct Crossing {
     value: f64,
 }
 
-/// Where the baseband passes the negative real axis and the unit circle.
+/// Crossings of the negative real axis and the unit circle.
 #[derive(Default)]
 struct Crossings {
     gain: Vec<Crossing>,

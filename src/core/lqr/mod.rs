@@ -1,4 +1,4 @@
-//! LQR design: weights, Riccati equation, gain, cost, poles and residual; margins of the loop as it runs.
+//! LQR design: weights, Riccati equation, gain, cost, poles and residual; margins of the sampled loop.
 
 mod balance;
 mod care;
@@ -22,7 +22,6 @@ mod sign;
 mod square;
 #[cfg(test)]
 mod tests;
-mod weights;
 
 pub use care::{CareInput, CareSolution, solve_care};
 pub use design::{LqrDesign, design};
@@ -31,4 +30,3 @@ pub use error::{CareError, DesignError};
 pub use margins::{Margins, SampledLoop, margins};
 pub use placement::{Placement, weights_for_pole};
 pub use running::{SampledPole, SampledResponse, damping, sampled_poles, sampled_response};
-pub use weights::Weights;

@@ -5,8 +5,8 @@ use nalgebra::{Complex, SMatrix, Vector2, Vector4};
 use super::design::design;
 use super::margins::SampledLoop;
 use super::running::{SampledPole, sampled_poles};
-use super::weights::Weights;
-use crate::robot::LinearModel;
+use crate::model::LinearModel;
+use crate::model::Weights;
 
 /// In how many parts the way is walked: where a way of few parts is lost, one of more is tried.
 const PARTS: [usize; 3] = [1, 4, 12];
@@ -23,19 +23,19 @@ const LONGEST: f64 = 1.1;
 /// Imaginary part, relative to the pole's size, below which it counts as real.
 const REAL: f64 = 1e-6;
 
-/// How far weights can take a pole.
+/// Reachable range of a pole by changing weights.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placement {
     /// Those that take it there, or as far along the way as there are any; to three digits, as people write weights,
     /// where the loop is as stable with these.
     pub weights: Weights,
-    /// Where the pole is with them, 1/s.
+    /// Pole with these weights, 1/s.
     pub pole: Complex<f64>,
-    /// Whether that is where it was wanted.
+    /// True if that is where it was wanted.
     pub is_reached: bool,
 }
 
-/// Weights with R and the correlations of `start` whose loop, as it runs, has its pole `from` at `to`, 1/s; a real
+/// Weights with R and the correlations of `start` whose loop, when sampled, has its pole `from` at `to`, 1/s; a real
 /// pole stays real. Of all that do, those next to `start` in the logarithms of Q's diagonal, about: Newton's method
 /// along the line from one to the other. Where the line leaves what diagonals of Q from 1e-6 to 1e8 can do, they are
 /// those of its last place. No pole comes to lie further right than the rightmost of `start`, or than the imaginary
@@ -69,7 +69,7 @@ struct Search<'a> {
     model: &'a LinearModel,
     timing: &'a SampledLoop,
     start: &'a Weights,
-    /// How far to the right a pole may be, 1/s.
+    /// Largest real part of a pole, 1/s.
     rightmost: f64,
 }
 

@@ -1,23 +1,23 @@
-//! The loop as it runs, short of its limits: its poles, and how it answers a disturbance.
+//! The loop when sampled, short of its limits: its poles, and how it answers a disturbance.
 
 use nalgebra::{Complex, Matrix2x4, Vector4};
 
 use super::margins::{Analysis, SampledLoop};
-use crate::robot::{LinearModel, State};
+use crate::model::{LinearModel, State};
 
 /// Longest answer, so that a slip of the hand does not fill the memory.
 const MOST_TICKS: f64 = 1e6;
-/// What a mode that is gone after one IMU period leaves of rounding.
+/// Rounding threshold of a mode that has decayed within one IMU period.
 const SMALLEST: f64 = 1e-9;
 /// Size from which on an answer that grows is cut, in SI units.
 const LARGEST: f64 = 1e9;
 
-/// A closed-loop pole of the loop as it runs.
+/// A closed-loop pole of the sampled loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SampledPole {
     /// Factor of its mode over one IMU period; inside of the unit circle where the mode dies out.
     pub z: Complex<f64>,
-    /// The same as a rate, ln z over the period, 1/s; its imaginary part is half the IMU's rate at most.
+    /// Continuous-time equivalent, ln z / period, 1/s; its imaginary part is half the IMU's rate at most.
     pub s: Complex<f64>,
 }
 
@@ -29,6 +29,12 @@ impl SampledPole {
 }
 
 /// Damping of a pole, −Re s / |s|; 1 at 0.
+///
+/// ```
+/// use nalgebra::Complex;
+///
+/// assert_eq!(flqr_core::lqr::damping(Complex::new(-3.0, 4.0)), 0.6);
+/// ```
 pub fn damping(s: Complex<f64>) -> f64 {
     if s.norm() > 0.0 { -s.re / s.norm() } else { 1.0 }
 }
@@ -37,6 +43,18 @@ pub fn damping(s: Complex<f64>) -> f64 {
 /// other. Those of what is only passed on (commands under way, samples held) are among them, fast as they are,
 /// apart from those at z = 0. Empty where [`margins`](super::margins()) would not analyse the loop, or where its
 /// delay is above 64 ticks.
+///
+/// ```
+/// # let model = flqr_core::model_file::presets::paper();
+/// # let robot = model.robot().ok_or("no robot")?;
+/// # let linear = robot.parameters.linear_model();
+/// # let gain = flqr_core::lqr::design(&linear, &robot.weights.ok_or("no weights")?)?.gain;
+/// use flqr_core::lqr::{SampledLoop, sampled_poles};
+///
+/// let poles = sampled_poles(&linear, &gain, &SampledLoop::of(robot));
+/// assert!(poles.iter().all(|pole| pole.z.norm() < 1.0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn sampled_poles(model: &LinearModel, gain: &Matrix2x4<f64>, timing: &SampledLoop) -> Vec<SampledPole> {
     if !timing.is_analysed() {
         return Vec::new();
@@ -49,19 +67,19 @@ pub fn sampled_poles(model: &LinearModel, gain: &Matrix2x4<f64>, timing: &Sample
     poles.into_iter().map(|z| SampledPole { z, s: z.ln() / period_s }).collect()
 }
 
-/// How the loop goes on from a state, tick by tick.
+/// Step-by-step response of the loop from a state.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SampledResponse {
     /// Time from one entry to the next, s.
     pub tick_s: f64,
     /// True state at every tick, the initial one first.
     pub states: Vec<State>,
-    /// Torque that is asked of the left and the right motor at every tick, N m; it acts a delay later.
+    /// Torque that is required of the left and the right motor at every tick, N m; it acts a delay later.
     pub torque_nm: Vec<[f64; 2]>,
 }
 
 impl SampledResponse {
-    /// Largest torque that is asked of either motor, N m.
+    /// Largest torque that is required of either motor, N m.
     pub fn peak_torque_nm(&self) -> f64 {
         self.torque_nm.iter().flatten().fold(0.0, |peak: f64, torque| peak.max(torque.abs()))
     }
@@ -71,6 +89,20 @@ impl SampledResponse {
 /// held IMU, without friction, noise and torque limit. Nothing is under way at the start and the IMU has seen
 /// the initial state. Cut where it grows out of all bounds, and at a million ticks; empty where
 /// [`sampled_poles`] is.
+///
+/// ```
+/// # let model = flqr_core::model_file::presets::paper();
+/// # let robot = model.robot().ok_or("no robot")?;
+/// # let linear = robot.parameters.linear_model();
+/// # let gain = flqr_core::lqr::design(&linear, &robot.weights.ok_or("no weights")?)?.gain;
+/// use flqr_core::lqr::{SampledLoop, sampled_response};
+/// use flqr_core::model::State;
+///
+/// let initial = State { pitch_rad: 0.05, ..State::default() };
+/// let response = sampled_response(&linear, &gain, &SampledLoop::of(robot), &initial, 20.0);
+/// assert!(response.states.last().is_some_and(|state| state.pitch_rad.abs() < 1e-3));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn sampled_response(
     model: &LinearModel,
     gain: &Matrix2x4<f64>,
@@ -107,7 +139,7 @@ pub fn sampled_response(
     response
 }
 
-/// What the controller takes for the state: x and ẋ from encoders and the held pitch.
+/// State seen by the controller: x and ẋ from encoders and the held pitch.
 fn measured(x: &Vector4<f64>, [pitch, rate]: [f64; 2], radius: f64) -> Vector4<f64> {
     Vector4::new(x[0] + radius * (pitch - x[2]), x[1] + radius * (rate - x[3]), pitch, rate)
 }

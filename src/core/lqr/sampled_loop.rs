@@ -1,4 +1,4 @@
-//! The loop as it runs: plant between ticks, transport delay, held IMU.
+//! The loop when sampled: plant between ticks, transport delay, held IMU.
 //!
 //! Command u[n] is computed at tick n and acts, held for one tick, from `delay_s` later on. With
 //! x = r (q + θ) the feedback K X splits into a part that the encoders give at every tick,
@@ -153,7 +153,7 @@ impl SampledSystem {
         fast_closed + factor * self.held(angle) * pitch + fast_closed * folded
     }
 
-    /// The same at half the IMU's rate, where it is real: zero where the factor puts a pole at −1 over one IMU
+    /// Value at half the IMU's rate, where it is real: zero where the factor puts a pole at −1 over one IMU
     /// period.
     pub(super) fn characteristic_at_half_rate(&self, factor: f64) -> f64 {
         let frequency_rad_s = 0.5 * self.imu_rate_rad_s();

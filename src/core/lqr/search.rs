@@ -1,4 +1,4 @@
-//! From a balanced equation to its stabilising solution: methods in the order of their price, each judged
+//! From a balanced equation to its stabilising solution: methods in the order of their price, each assessed
 //! by its outcome.
 
 use nalgebra::Complex;
@@ -18,9 +18,9 @@ type Exact = SquareN<DoubleDouble>;
 const NEGLIGIBLE: f64 = 1e-19;
 /// A contraction of successive corrections in double slower than this will not reach [`NEGLIGIBLE`] soon.
 const SLOW: f64 = 0.1;
-/// The same in double-double: towards a pole on the axis Newton's method halves its error, beyond is rounding.
+/// Refinement in double-double: towards a pole on the axis Newton's method halves its error, beyond is rounding.
 const STAGNANT: f64 = 0.75;
-/// Corrections above this have no quadratic convergence to judge by yet.
+/// Corrections above this have no quadratic convergence to assess by yet.
 const FAR: f64 = 1e-2;
 /// Error above which digits are missing that the user would expect.
 const WORTH_A_WARNING: f64 = 1e-9;
@@ -143,8 +143,8 @@ fn accept(
         return None;
     }
     warnings.push(format!(
-        "poles on the imaginary axis to rounding (real part {rightmost:.1e}): the closed loop is not \
-         asymptotically stable, and p solves the equation but need not be the only p that does so"
+        "poles on the imaginary axis within rounding (real part {rightmost:.1e}): the \
+         closed loop is not asymptotically stable, and p may not be the unique solution"
     ));
     Some(Found { p: candidate.p, poles, warnings })
 }

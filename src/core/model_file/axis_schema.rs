@@ -2,12 +2,13 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::effects_schema;
 use super::effects_schema::EffectTable;
 use super::refusal::Refusal;
 use super::tolerance::ToleranceTable;
-use super::{AxisModel, AxisParameters, Model, Rig, effects_schema};
-use crate::effects::MachineKind;
 use crate::friction::{Stribeck, StribeckParameters};
+use crate::model::MachineKind;
+use crate::model::{AxisModel, AxisParameters, Model, Rig};
 use crate::parameter::{ParameterError, finite, positive};
 
 #[derive(Deserialize, Serialize)]
@@ -51,8 +52,8 @@ struct AxisFrictionTable {
     offset_n: Option<f64>,
     stribeck_exponent: Option<f64>,
     /// Lowest and highest speed of the motion that the numbers come from.
-    told_from_rad_s: Option<[f64; 2]>,
-    told_from_m_s: Option<[f64; 2]>,
+    fitted_speed_range_rad_s: Option<[f64; 2]>,
+    fitted_speed_range_m_s: Option<[f64; 2]>,
 }
 
 /// One kind's keys and values in the order Coulomb, viscous, offset, static, Stribeck speed.
@@ -81,7 +82,10 @@ impl AxisFrictionTable {
 
     /// Speeds that the curve comes from, on one kind of axis.
     fn told_from(&self, linear: bool) -> Result<Option<[f64; 2]>, Refusal> {
-        let keys = [("told_from_rad_s", self.told_from_rad_s), ("told_from_m_s", self.told_from_m_s)];
+        let keys = [
+            ("fitted_speed_range_rad_s", self.fitted_speed_range_rad_s),
+            ("fitted_speed_range_m_s", self.fitted_speed_range_m_s),
+        ];
         let [(own, range), (other, wrong)] = if linear { [keys[1], keys[0]] } else { keys };
         if wrong.is_some() {
             let problem = format!("{other} has the unit of the other kind of axis: use {own}");
@@ -89,7 +93,7 @@ impl AxisFrictionTable {
         }
         match range {
             Some([low, high]) if !(0.0 <= low && low < high && high.is_finite()) => {
-                let problem = format!("{own} must be a lowest and a higher highest speed, as [0.5, 12.0]");
+                let problem = format!("{own} must be the lowest and the highest speed, such as [0.5, 12.0]");
                 Err(Refusal::new(&["friction", own], problem))
             }
             range => Ok(range),
@@ -143,7 +147,7 @@ impl AxisFile {
         };
         let mut axis = AxisModel::new(parameters);
         let linear = machine == MachineKind::Linear;
-        axis.friction_told_from = friction.map(|table| table.told_from(linear)).transpose()?.flatten();
+        axis.fitted_speed_range = friction.map(|table| table.told_from(linear)).transpose()?.flatten();
         effects_schema::read_into_axis(self.effects, machine, &mut axis)?;
         let tolerance = self.tolerance.read(machine)?;
         Ok(Model { name: self.name, rig: Rig::Axis(axis), tolerance })
@@ -161,7 +165,7 @@ impl AxisFile {
                         stribeck_speed_rad_s: Some(p.stribeck_speed_rad_s),
                         stribeck_exponent: Some(p.stribeck_exponent),
                         offset_nm: Some(p.offset_nm),
-                        told_from_rad_s: own.friction_told_from,
+                        fitted_speed_range_rad_s: own.fitted_speed_range,
                         ..AxisFrictionTable::default()
                     }
                 });
@@ -177,7 +181,7 @@ impl AxisFile {
                         stribeck_speed_m_s: Some(p.stribeck_speed_rad_s),
                         stribeck_exponent: Some(p.stribeck_exponent),
                         offset_n: Some(p.offset_nm),
-                        told_from_m_s: own.friction_told_from,
+                        fitted_speed_range_m_s: own.fitted_speed_range,
                         ..AxisFrictionTable::default()
                     }
                 });

@@ -1,8 +1,9 @@
-//! What differs between two models, key by key as their files would have it.
+//! Differences between two models by key of their files.
 
 use std::collections::BTreeSet;
 
-use super::{Entry, Model};
+use super::Entry;
+use crate::model::Model;
 
 /// A key that two models do not have alike.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -10,14 +11,14 @@ pub struct Change {
     /// Tables and key with points between them, and the number of an entry of a list from 1 in brackets:
     /// `lqr.q_diagonal[3]`.
     pub key: String,
-    /// Value of before; none where the key was not there.
+    /// Value of before; `None` if the key was not there.
     pub old: Option<String>,
-    /// Value of now; none where the key is gone.
+    /// Value of now; `None` if the key is gone.
     pub new: Option<String>,
 }
 
 impl Model {
-    /// What is other in `new`, in the order of the keys.
+    /// Returns the differences in `new`, in the order of the keys.
     pub fn changes_to(&self, new: &Self) -> Vec<Change> {
         let (old, new) = (self.entries(), new.entries());
         let keys: BTreeSet<&String> = old.keys().chain(new.keys()).collect();
@@ -42,7 +43,7 @@ mod tests {
         let text = old.to_toml();
         let mut new = Model::from_toml(&text, "m").unwrap();
         new.name = "another".to_owned();
-        let crate::model_file::Rig::Robot(robot) = &mut new.rig else { panic!("the paper has a robot") };
+        let crate::model::Rig::Robot(robot) = &mut new.rig else { panic!("the paper has a robot") };
         robot.parameters.body_mass_kg = 20.0;
         robot.friction[1] = None;
         robot.effects.clear();

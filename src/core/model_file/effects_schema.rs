@@ -3,9 +3,9 @@
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::refusal::Refusal;
-use super::{AxisModel, RobotModel};
-use crate::effects::{Declared, Effect, Feedforward, MachineKind};
-use crate::robot::Motor;
+use crate::effects::{Declared, Feedforward};
+use crate::model::{AxisModel, RobotModel};
+use crate::model::{Effect, MachineKind, Motor};
 
 /// One table, as it was read or is to be written.
 pub(super) enum EffectTable {
@@ -41,7 +41,7 @@ pub(super) fn read_into_robot(tables: Vec<EffectTable>, robot: &mut RobotModel) 
     Ok(())
 }
 
-/// The same for a motor or carriage.
+/// Reads the effects of a motor or carriage.
 pub(super) fn read_into_axis(
     tables: Vec<EffectTable>,
     machine: MachineKind,
@@ -67,8 +67,7 @@ fn read(
         if effect.kind().feedforward != Feedforward::Declared {
             effects.push(effect);
         } else if !declare(&effect) {
-            let problem =
-                format!("{} leaves a model that no machine can have: correct its value", effect.id());
+            let problem = format!("{} makes the model physically impossible: correct its value", effect.id());
             return Err(refusal(at, None, problem));
         }
     }

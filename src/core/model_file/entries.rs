@@ -5,7 +5,7 @@ use std::fmt;
 
 use toml::Value;
 
-use super::Model;
+use crate::model::Model;
 
 /// One value of a model file.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,197 +1,36 @@
-//! Models on disk: TOML in, checked model out, and back.
+//! Model files: TOML to a checked model, and back.
 //!
-//! A file describes a wheel-legged robot (`[robot]`) or a single motor or axis (`[axis]`). Every error
-//! names the file, the line, the key and the mend; an unknown key is an error, because a misspelt key that
-//! is silently dropped would leave a default in its place.
+//! A file describes a wheel-legged robot (`[robot]`) or a single motor or axis (`[axis]`). Every error names the
+//! file, the line, the key and the remedy. An unknown key is an error, because a misspelt key would silently leave
+//! its default.
 
 mod axis_schema;
 mod changes;
 mod effects_schema;
 mod entries;
-mod keep;
+mod persistence;
+mod phrases;
 mod plausibility;
 pub mod presets;
 mod refusal;
+mod renamed_keys;
 mod robot_schema;
 mod tolerance;
-mod words;
 
 use std::borrow::Cow;
 
-use crate::ParameterError;
-use crate::effects::Effect;
-use crate::friction::{Compensation, Stribeck};
-use crate::lqr::Weights;
-use crate::robot::{
-    Actuation, Chassis, Legs, LinkSettings, MotorLimits, RobotParameters, SafetyLimits, SensorSettings,
-    Surroundings, YawHold,
-};
+use serde::Deserialize;
+
+use crate::model::{Model, Rig};
 use axis_schema::AxisFile;
 pub use changes::Change;
 pub use entries::Entry;
 pub use plausibility::ModelWarning;
 use refusal::Refusal;
+pub use renamed_keys::{RenamedKey, renamed_keys};
 use robot_schema::RobotFile;
-pub use tolerance::Tolerances;
 
-/// A loaded model.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Model {
-    /// Name for people.
-    pub name: String,
-    /// What is modelled.
-    pub rig: Rig,
-    /// How well its numbers are known.
-    pub tolerance: Tolerances,
-}
-
-/// What a model describes.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Rig {
-    /// A wheel-legged robot.
-    Robot(Box<RobotModel>),
-    /// A single motor or linear axis.
-    Axis(AxisModel),
-}
-
-/// A robot with its motors, sensors and surroundings, and the settings of its controller. Tables that a
-/// file does not have are at their defaults.
-#[derive(Clone, Debug, PartialEq)]
-pub struct RobotModel {
-    /// Masses, lengths and inertias, at the legs' present height.
-    pub parameters: RobotParameters,
-    /// How they follow the legs' height, if the file says so.
-    pub legs: Option<Legs>,
-    /// Both wheels apart, and the turning body.
-    pub chassis: Chassis,
-    /// Friction of the left and the right motor; none where the file has no table.
-    pub friction: [Option<Stribeck>; 2],
-    /// Weights of the cost, if the file has them.
-    pub weights: Option<Weights>,
-    /// Friction feedforward, if the file has it.
-    pub compensation: Option<Compensation>,
-    /// What keeps the heading, if the file says so.
-    pub yaw_hold: Option<YawHold>,
-    /// What the motors can do.
-    pub limits: MotorLimits,
-    /// From asked torque to shaft.
-    pub actuation: Actuation,
-    /// Sensors.
-    pub sensors: SensorSettings,
-    /// What acts from outside.
-    pub surroundings: Surroundings,
-    /// How motors and IMU are wired.
-    pub link: LinkSettings,
-    /// When the driven robot is stopped.
-    pub safety: SafetyLimits,
-    /// What else has been found; none of those that are errors of the numbers above, which are put right there.
-    pub effects: Vec<Effect>,
-}
-
-impl RobotModel {
-    /// A robot on level ground of which nothing but masses, lengths and inertias is known.
-    pub fn new(parameters: RobotParameters) -> Self {
-        Self {
-            parameters,
-            legs: None,
-            chassis: Chassis::default(),
-            friction: [None; 2],
-            weights: None,
-            compensation: None,
-            yaw_hold: None,
-            limits: MotorLimits::default(),
-            actuation: Actuation::default(),
-            sensors: SensorSettings::default(),
-            surroundings: Surroundings::default(),
-            link: LinkSettings::default(),
-            safety: SafetyLimits::default(),
-            effects: Vec::new(),
-        }
-    }
-
-    /// Replaces the parameters. Tables over the legs' height are scaled so that they go through the new
-    /// values at the present height.
-    pub fn set_parameters(&mut self, parameters: RobotParameters) {
-        if let Some(legs) = &mut self.legs {
-            legs.com_height_m.scale(parameters.com_height_m / self.parameters.com_height_m);
-            if let Some(inertia) = &mut legs.body_inertia_kg_m2 {
-                inertia.scale(parameters.body_inertia_kg_m2 / self.parameters.body_inertia_kg_m2);
-            }
-        }
-        self.parameters = parameters;
-    }
-
-    /// The robot with its legs at another height.
-    ///
-    /// # Errors
-    /// A robot without a table over the legs' height, or a height outside of it.
-    pub fn at_leg_height(&self, leg_height_m: f64) -> Result<Self, ParameterError> {
-        let Some(legs) = &self.legs else {
-            let allowed = "left out, because com_height_m of this model is one number and not a table over leg_height_m";
-            return Err(ParameterError {
-                name: "leg_height_m",
-                value: leg_height_m,
-                allowed: allowed.into(),
-            });
-        };
-        let parameters = legs.at(leg_height_m, &self.parameters)?;
-        Ok(Self { parameters, legs: Some(Legs { leg_height_m, ..legs.clone() }), ..self.clone() })
-    }
-
-    /// Refuses what no robot can have.
-    pub fn validate(&self) -> Result<(), ParameterError> {
-        self.parameters.validate()?;
-        self.chassis.validate()?;
-        self.yaw_hold.map_or(Ok(()), |hold| hold.validate())?;
-        self.limits.validate()?;
-        self.actuation.validate()?;
-        self.sensors.validate()?;
-        self.surroundings.validate()?;
-        self.link.validate()?;
-        self.safety.validate()
-    }
-}
-
-/// A single axis on a bench.
-#[derive(Clone, Debug, PartialEq)]
-pub struct AxisModel {
-    /// What moves, and its friction.
-    pub parameters: AxisParameters,
-    /// Lowest and highest speed of the motion from which its friction was told, rad/s or m/s; none where nobody said.
-    pub friction_told_from: Option<[f64; 2]>,
-    /// What else has been found; none of those that are errors of the numbers above, which are put right there.
-    pub effects: Vec<Effect>,
-}
-
-impl AxisModel {
-    /// An axis without further effects.
-    pub fn new(parameters: AxisParameters) -> Self {
-        Self { parameters, friction_told_from: None, effects: Vec::new() }
-    }
-}
-
-/// What moves on a bench.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum AxisParameters {
-    /// A motor shaft.
-    Rotary {
-        /// Inertia about the shaft, kg m².
-        inertia_kg_m2: f64,
-        /// Load = this × sin(angle), angle 0 hanging down, N m; 0 for a balanced shaft.
-        gravity_torque_nm: f64,
-        /// Friction on the shaft.
-        friction: Option<Stribeck>,
-    },
-    /// A carriage.
-    Linear {
-        /// Moved mass, kg.
-        mass_kg: f64,
-        /// Friction; its fields hold N, N s/m and m/s in place of N m, N m s/rad and rad/s.
-        friction: Option<Stribeck>,
-    },
-}
-
-/// Why a model file could not be loaded.
+/// Reason why a model file could not be loaded.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{file}:{line}:{column}: {problem}")]
 pub struct ModelFileError {
@@ -201,7 +40,7 @@ pub struct ModelFileError {
     pub line: usize,
     /// Column in bytes, from 1.
     pub column: usize,
-    /// What is wrong and how it is mended.
+    /// Problem and remedy.
     pub problem: String,
 }
 
@@ -210,19 +49,33 @@ impl Model {
     ///
     /// # Errors
     /// Text that is not TOML, a missing or unknown key, a value of the wrong type or out of range.
+    ///
+    /// ```
+    /// use flqr_core::model::Model;
+    ///
+    /// let text = "name = \"motor\"\n[axis]\nkind = \"rotary\"\ninertia_kg_m2 = 0.01\n";
+    /// let model = Model::from_toml(text, "motor.toml")?;
+    /// assert!(model.robot().is_none());
+    ///
+    /// let error = Model::from_toml(&text.replace("inertia_kg_m2", "inertia"), "motor.toml").unwrap_err();
+    /// assert!(error.to_string().starts_with("motor.toml:2:1: unknown key `inertia`"));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn from_toml(text: &str, file: &str) -> Result<Self, ModelFileError> {
         let error = |byte, problem| {
             let (line, column) = position_at(text, byte);
             ModelFileError { file: file.to_owned(), line, column, problem }
         };
         let start = |e: &toml::de::Error| e.span().map_or(0, |span| span.start);
-        let not_toml = |e: toml::de::Error| error(start(&e), words::not_toml(e.message(), text, start(&e)));
-        let unread = |e: toml::de::Error| error(start(&e), words::unread(e.message(), text, start(&e)));
-        let document = toml::de::DeTable::parse(text).map_err(not_toml)?;
+        let not_toml = |e: toml::de::Error| error(start(&e), phrases::not_toml(e.message(), text, start(&e)));
+        let unread = |e: toml::de::Error| error(start(&e), phrases::unread(e.message(), text, start(&e)));
+        let mut document = toml::de::DeTable::parse(text).map_err(not_toml)?;
+        renamed_keys::rename(document.get_mut()).map_err(|(byte, problem)| error(byte, problem))?;
         let has = |table: &str| document.get_ref().contains_key(table);
+        let reader = || toml::de::Deserializer::from(document.clone());
         let model = match (has("robot"), has("axis")) {
-            (true, false) => toml::from_str::<RobotFile>(text).map_err(unread)?.into_model(),
-            (false, true) => toml::from_str::<AxisFile>(text).map_err(unread)?.into_model(),
+            (true, false) => RobotFile::deserialize(reader()).map_err(unread)?.into_model(),
+            (false, true) => AxisFile::deserialize(reader()).map_err(unread)?.into_model(),
             (true, true) => Err(Refusal::new(
                 &["axis"],
                 "a model describes either a [robot] or an [axis]: remove one table",
@@ -236,20 +89,21 @@ impl Model {
     }
 
     /// The model as TOML that [`Model::from_toml`] reads back to an equal model.
+    ///
+    /// ```
+    /// use flqr_core::model::Model;
+    /// use flqr_core::model_file::presets;
+    ///
+    /// let model = presets::paper();
+    /// assert_eq!(Model::from_toml(&model.to_toml(), "copy.toml")?, model);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn to_toml(&self) -> String {
         let text = match &self.rig {
             Rig::Robot(robot) => toml::to_string(&RobotFile::from_model(self, robot)),
             Rig::Axis(axis) => toml::to_string(&AxisFile::from_model(self, axis)),
         };
         text.expect("plain numbers and strings always have a TOML form")
-    }
-
-    /// The robot, where the model is one.
-    pub fn robot(&self) -> Option<&RobotModel> {
-        match &self.rig {
-            Rig::Robot(robot) => Some(robot),
-            Rig::Axis(_) => None,
-        }
     }
 }
 
@@ -280,6 +134,7 @@ fn start_of(document: &toml::de::DeTable<'_>, path: &[Cow<'static, str>]) -> usi
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::{AxisParameters, Effect, RobotParameters, Weights};
 
     const ROBOT: &str = r#"name = "test"
 [robot]
@@ -432,7 +287,7 @@ sin_1_n = 0.5
         }
         let model = Model::from_toml(&format!("{ROBOT}{COGGING}"), "m.toml").unwrap();
         let [cogging, tether] = &model.robot().unwrap().effects[..] else { panic!("{model:?}") };
-        assert_eq!((cogging.get("order_2"), cogging.motor()), (Some(7.0), Some(crate::robot::Motor::Left)));
+        assert_eq!((cogging.get("order_2"), cogging.motor()), (Some(7.0), Some(crate::model::Motor::Left)));
         assert_eq!((tether.get("pull_n"), tether.motor()), (Some(0.0), None));
         assert!(
             model.to_toml().contains("order_1 = 14.0\ncos_1_nm = 0.002\nsin_1_nm = -0.008\norder_2 = 7.0")
@@ -464,7 +319,7 @@ sin_1_n = 0.5
         let lines = ROBOT.lines().count();
         let robot = |old: &str, new: &str| format!("{ROBOT}{}", COGGING.replacen(old, new, 1));
         for (text, line, part) in [
-            (robot("\"cogging\"", "\"coging\""), lines + 3, "there is no effect coging: use one of cogging,"),
+            (robot("\"cogging\"", "\"coging\""), lines + 3, "unknown effect coging: use one of cogging,"),
             (robot("\"cogging\"", "3"), lines + 3, "id = 3 is not a name"),
             (robot("\"left\"", "\"middle\""), lines + 4, "use \"left\", \"right\" or \"both\""),
             (robot("order_1 = 14", "order_1 = 14.5"), lines + 5, "must be a whole number"),
@@ -478,9 +333,9 @@ sin_1_n = 0.5
             (
                 format!("{ROBOT}[[effects]]\nid = \"mass_error\"\nmass_kg = -20.0\n"),
                 lines + 2,
-                "no machine can have",
+                "physically impossible",
             ),
-            (format!("{RAIL}[[effects]]\nid = \"tether_spring\"\n"), 10, "cannot be on a linear axis"),
+            (format!("{RAIL}[[effects]]\nid = \"tether_spring\"\n"), 10, "does not apply to a linear axis"),
             (
                 format!("{RAIL}{}", RAIL_EFFECTS.replace("period_1_m", "order_1")),
                 12,
@@ -510,7 +365,7 @@ sin_1_n = 0.5
             panic!("a linear axis was read as a rotary one");
         };
         // Without the Stribeck keys the curve is plain Coulomb friction at every speed.
-        assert_eq!((mass_kg, friction.unwrap().level_nm(0.01)), (95.0, 20.4));
+        assert_eq!((mass_kg, friction.unwrap().amplitude_nm(0.01)), (95.0, 20.4));
     }
 
     #[test]
@@ -519,7 +374,7 @@ sin_1_n = 0.5
             (
                 ROBOT.replace("com_height_m", "com_hight_m"),
                 7,
-                "unknown key `com_hight_m`: write `com_height_m`, which is nearest, or take it out; known here: ",
+                "unknown key `com_hight_m`: write `com_height_m`, the most similar key, or remove it; known keys: ",
             ),
             (
                 ROBOT.replace("body_mass_kg = 13.0", "body_mass_kg = -13.0"),
@@ -567,14 +422,14 @@ sin_1_n = 0.5
     #[test]
     fn a_file_that_was_cut_off_is_told_as_one() {
         for (last, line, part) in [
-            ("wheel_ra", 6, "the file ends in the middle of `wheel_ra`: finish the line"),
+            ("wheel_ra", 6, "the file ends in the middle of `wheel_ra`: complete the line"),
             ("q_diagonal = [60.0, 30", 17, "the file ends in the middle of `q_diagonal = [60.0, 30`"),
             (
                 "wheel_inertia_kg_m2 = 0.00",
                 2,
                 "missing key `wheel_radius_m`: add it here; the file ends in this table",
             ),
-            ("static_nm = 0.0761\n", 9, "cut off, take the whole one"),
+            ("static_nm = 0.0761\n", 9, "truncated, use the complete file"),
         ] {
             let (before, _) = ROBOT.split_once(last).unwrap();
             let error = Model::from_toml(&format!("{before}{last}"), "m.toml").unwrap_err();

@@ -3,7 +3,8 @@
 use std::fmt;
 use std::ops::RangeInclusive;
 
-use super::{Entry, Model};
+use super::Entry;
+use crate::model::Model;
 use crate::unit_slip::{
     self, CENTIMETRES, DEGREES, DEGREES_PER_SECOND, GRAM_SQUARE_CENTIMETRES, GRAMS,
     KILOGRAM_SQUARE_CENTIMETRES, KILOGRAM_SQUARE_MILLIMETRES, MICROSECONDS, MILLIMETRES, MILLINEWTON_METRES,
@@ -15,7 +16,7 @@ use crate::unit_slip::{
 pub struct ModelWarning {
     /// Tables and key with points between them, as in `robot.com_height_m`.
     pub key: String,
-    /// What is unlikely about it, with the unit that was probably meant.
+    /// Reason why it is implausible, with the unit probably meant.
     pub text: String,
 }
 
@@ -93,8 +94,8 @@ impl Model {
                 let (_, coulomb, unit) = STATIC_AND_COULOMB.into_iter().find(|(name, ..)| *name == last)?;
                 let sliding = number(&format!("{table}.{coulomb}")).filter(|sliding| value < *sliding)?;
                 Some(format!(
-                    "{} {unit} is below {coulomb} = {} {unit}: a shaft at rest needs at least the torque that keeps it \
-                     moving; check whether the two are exchanged",
+                    "{} {unit} is below {coulomb} = {} {unit}: breakaway needs at least the torque that sustains \
+                     motion; check whether the two are exchanged",
                     unit_slip::digits(value),
                     unit_slip::digits(sliding)
                 ))
@@ -105,7 +106,7 @@ impl Model {
     }
 }
 
-/// What is unlikely about the value of a key such as `robot.com_height_m.com_height_m[2]`.
+/// Checks the plausibility of the value of a key such as `robot.com_height_m.com_height_m[2]`.
 fn implausible(key: &str, value: f64) -> Option<String> {
     let table = key.split('.').next()?;
     let name = key.rsplit('.').next()?.split('[').next()?;

@@ -1,6 +1,6 @@
 //! The models that come with the program, compiled in so that it starts without any file.
 
-use super::Model;
+use crate::model::Model;
 
 /// Name and TOML text of each preset; the text says where every number comes from.
 pub const ALL: [(&str, &str); 3] = [

@@ -3,17 +3,16 @@
 use nalgebra::{Matrix2, Matrix4};
 use serde::{Deserialize, Serialize};
 
+use super::effects_schema;
 use super::effects_schema::EffectTable;
 use super::refusal::Refusal;
 use super::tolerance::ToleranceTable;
-use super::{Model, Rig, RobotModel, effects_schema};
-use crate::effects::MachineKind;
 use crate::friction::{Compensation, Stribeck, StribeckParameters};
-use crate::lqr::Weights;
-use crate::robot::{
-    Actuation, Chassis, HeightNode, Legs, LinkSettings, MotorLimits, OverHeight, RobotParameters,
-    STANDARD_GRAVITY_M_S2, SafetyLimits, SensorSettings, Surroundings, YawHold,
+use crate::model::{
+    Actuation, Chassis, HeightNode, Legs, LinkSettings, MachineKind, MotorLimits, OverHeight,
+    RobotParameters, STANDARD_GRAVITY_M_S2, SafetyLimits, SensorSettings, Surroundings, Weights, YawHold,
 };
+use crate::model::{Model, Rig, RobotModel};
 
 #[derive(Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
@@ -49,7 +48,7 @@ fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
 }
 
-/// `[robot]`: [`RobotParameters`], with tables over the legs' height where they change with it.
+/// `[robot]`: [`RobotParameters`], with tables over leg height where they change with it.
 #[derive(Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 struct RobotTable {

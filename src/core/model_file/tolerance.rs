@@ -1,136 +1,9 @@
-//! How well the declared numbers are known.
+//! The `[tolerance]` table of a model file.
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::refusal::Refusal;
-use crate::effects::MachineKind;
-use crate::parameter::{ParameterError, within};
-
-/// Shares of themselves by which declared numbers may be off; what a file does not name has its group's default.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Tolerances {
-    /// Key and share, sorted by the key.
-    named: Vec<(&'static str, f64)>,
-}
-
-/// Numbers of one kind.
-struct Group {
-    key: &'static str,
-    share: f64,
-    members: &'static [(&'static str, &'static [MachineKind])],
-}
-
-const ROBOT: &[MachineKind] = &[MachineKind::Robot];
-const ROTARY: &[MachineKind] = &[MachineKind::Rotary];
-const LINEAR: &[MachineKind] = &[MachineKind::Linear];
-const TURNING: &[MachineKind] = &[MachineKind::Robot, MachineKind::Rotary];
-const ALL: &[MachineKind] = &[MachineKind::Robot, MachineKind::Rotary, MachineKind::Linear];
-
-const MASSES: Group = Group {
-    key: "masses",
-    share: 0.02,
-    members: &[("body_mass_kg", ROBOT), ("wheel_mass_kg", ROBOT), ("mass_kg", LINEAR)],
-};
-const LENGTHS: Group =
-    Group { key: "lengths", share: 0.01, members: &[("wheel_radius_m", ROBOT), ("com_height_m", ROBOT)] };
-const INERTIAS: Group = Group {
-    key: "inertias",
-    share: 0.05,
-    members: &[("wheel_inertia_kg_m2", ROBOT), ("body_inertia_kg_m2", ROBOT), ("inertia_kg_m2", ROTARY)],
-};
-const FRICTION: Group = Group {
-    key: "friction",
-    share: 0.1,
-    members: &[
-        ("coulomb_nm", TURNING),
-        ("static_nm", TURNING),
-        ("viscous_nm_s_rad", TURNING),
-        ("stribeck_speed_rad_s", TURNING),
-        ("offset_nm", TURNING),
-        ("coulomb_n", LINEAR),
-        ("static_n", LINEAR),
-        ("viscous_n_s_m", LINEAR),
-        ("stribeck_speed_m_s", LINEAR),
-        ("offset_n", LINEAR),
-        ("stribeck_exponent", ALL),
-    ],
-};
-const GROUPS: [Group; 4] = [MASSES, LENGTHS, INERTIAS, FRICTION];
-/// A mass on a lever: known as well as both together.
-const GRAVITY: &str = "gravity_torque_nm";
-
-impl Tolerances {
-    /// By which share of itself the number with this key of the model file may be off; 0 where it has no tolerance.
-    /// The group names `masses`, `lengths`, `inertias` and `friction` are keys too.
-    pub fn share_of(&self, key: &str) -> f64 {
-        if let Some((_, share)) = self.named.iter().find(|(name, _)| *name == key) {
-            return *share;
-        }
-        if key == GRAVITY {
-            return self.share_of(MASSES.key) + self.share_of(LENGTHS.key);
-        }
-        if let Some(group) = GROUPS.iter().find(|group| group.key == key) {
-            return group.share;
-        }
-        let group = GROUPS.iter().find(|group| group.members.iter().any(|(member, _)| *member == key));
-        group.map_or(0.0, |group| self.share_of(group.key))
-    }
-
-    /// Says how well a number, or a group of them, is known.
-    ///
-    /// # Errors
-    /// A share below 0 or above 1, or a key that no model has.
-    pub fn set(&mut self, key: &str, share: f64) -> Result<(), ParameterError> {
-        let Some(key) = keys(ALL).find(|name| *name == key) else {
-            let allowed = "left out, because no number of a model file has this key";
-            return Err(ParameterError { name: "tolerance", value: share, allowed: allowed.into() });
-        };
-        within(key, share, 0.0..=1.0, "a share from 0 to 1")?;
-        match self.named.binary_search_by_key(&key, |(name, _)| *name) {
-            Ok(place) => self.named[place].1 = share,
-            Err(place) => self.named.insert(place, (key, share)),
-        }
-        Ok(())
-    }
-
-    fn read(table: &toml::Table, machine: MachineKind) -> Result<Self, Refusal> {
-        let mut found = Self::default();
-        for (key, value) in table {
-            let refused =
-                |problem: String| Refusal { path: vec!["tolerance".into(), key.clone().into()], problem };
-            if !keys(&[machine]).any(|name| name == key) {
-                let allowed = keys(&[machine]).collect::<Vec<_>>().join(", ");
-                return Err(refused(format!("unknown key `{key}` in [tolerance]: use {allowed}")));
-            }
-            let number = value.as_float().or_else(|| value.as_integer().map(|whole| whole as f64));
-            let Some(share) = number else {
-                return Err(refused(format!(
-                    "{key} = {value} is not a number: write a share as {key} = 0.02"
-                )));
-            };
-            found.set(key, share).map_err(|error| refused(error.to_string()))?;
-        }
-        Ok(found)
-    }
-}
-
-/// All keys that machines of some kinds may have.
-fn keys(kinds: &[MachineKind]) -> impl Iterator<Item = &'static str> {
-    let has = |on: &[MachineKind]| on.iter().any(|kind| kinds.contains(kind));
-    let mut found = Vec::new();
-    for group in &GROUPS {
-        let members: Vec<_> =
-            group.members.iter().filter(|(_, on)| has(on)).map(|(member, _)| *member).collect();
-        if !members.is_empty() {
-            found.push(group.key);
-            found.extend(members);
-        }
-    }
-    if has(ROTARY) {
-        found.push(GRAVITY);
-    }
-    found.into_iter()
-}
+use crate::model::{MachineKind, Tolerances, tolerance_keys};
 
 /// `[tolerance]`, as it was read or is to be written.
 pub(super) enum ToleranceTable {
@@ -148,7 +21,7 @@ impl ToleranceTable {
 
     pub(super) fn read(self, machine: MachineKind) -> Result<Tolerances, Refusal> {
         match self {
-            Self::Read(table) => Tolerances::read(&table, machine),
+            Self::Read(table) => read(&table, machine),
             Self::Written(tolerances) => Ok(tolerances),
         }
     }
@@ -173,6 +46,26 @@ impl Serialize for ToleranceTable {
             Self::Written(tolerances) => serializer.collect_map(tolerances.named.iter().copied()),
         }
     }
+}
+
+fn read(table: &toml::Table, machine: MachineKind) -> Result<Tolerances, Refusal> {
+    let mut found = Tolerances::default();
+    for (key, value) in table {
+        let refused =
+            |problem: String| Refusal { path: vec!["tolerance".into(), key.clone().into()], problem };
+        if !tolerance_keys(&[machine]).any(|name| name == key) {
+            let allowed = tolerance_keys(&[machine]).collect::<Vec<_>>().join(", ");
+            return Err(refused(format!("unknown key `{key}` in [tolerance]: use {allowed}")));
+        }
+        let number = value.as_float().or_else(|| value.as_integer().map(|whole| whole as f64));
+        let Some(share) = number else {
+            return Err(refused(format!(
+                "{key} = {value} is not a number: write a fraction as {key} = 0.02"
+            )));
+        };
+        found.set(key, share).map_err(|error| refused(error.to_string()))?;
+    }
+    Ok(found)
 }
 
 #[cfg(test)]
@@ -213,7 +106,7 @@ mod tests {
     fn each_mistake_is_named_with_its_line() {
         for (text, key, part) in [
             (SHAFT, "inertia_kg_m2 = -0.1", "inertia_kg_m2 = -0.1 is out of range"),
-            (SHAFT, "friction = 20", "a share from 0 to 1"),
+            (SHAFT, "friction = 20", "a fraction from 0 to 1"),
             (SHAFT, "friction = \"high\"", "is not a number"),
             (SHAFT, "body_mass_kg = 0.1", "unknown key `body_mass_kg`"),
             (RAIL, "coulomb_nm = 0.1", "use masses, mass_kg, friction, coulomb_n"),

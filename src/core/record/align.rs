@@ -9,10 +9,10 @@ pub struct Signal<'a> {
     pub values: &'a [f64],
 }
 
-/// Where two signals fit best.
+/// Best alignment of two signals.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Alignment {
-    /// What to add to the times of the moved signal, s.
+    /// Time shift of the moved signal, s.
     pub shift_s: f64,
     /// Correlation of both there, 1 at most.
     pub correlation: f64,
@@ -23,12 +23,25 @@ const INSTANTS: usize = 1000;
 /// Each search after the first is this much finer, around the best so far.
 const FINER: f64 = 20.0;
 const SEARCHES: usize = 3;
-/// Share of the shorter signal that has to lie on the other.
+/// Fraction of the shorter signal that has to lie on the other.
 const OVERLAP: f64 = 0.5;
 
 /// The shift of `moved` at which its correlation with `fixed` is largest, over all at which half of the shorter
 /// one lies on the other; to about a millionth of the longer one's duration. None for signals that are constant,
 /// or have fewer than two samples.
+///
+/// ```
+/// use flqr_core::record::{Signal, best_alignment};
+///
+/// let time_s: Vec<f64> = (0..1000).map(|i| 0.01 * f64::from(i)).collect();
+/// let pulse = |centre_s: f64| time_s.iter().map(|t| (-(t - centre_s).powi(2)).exp()).collect::<Vec<_>>();
+/// let (earlier, later) = (pulse(4.0), pulse(5.5));
+/// let (fixed, moved) =
+///     (Signal { time_s: &time_s, values: &earlier }, Signal { time_s: &time_s, values: &later });
+/// let alignment = best_alignment(fixed, moved).ok_or("no alignment")?;
+/// assert!((alignment.shift_s + 1.5).abs() < 1e-3 && alignment.correlation > 0.999);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn best_alignment(fixed: Signal<'_>, moved: Signal<'_>) -> Option<Alignment> {
     let (fixed, moved) = (Samples::of(fixed)?, Samples::of(moved)?);
     let least = OVERLAP * fixed.duration().min(moved.duration());
@@ -51,6 +64,13 @@ pub fn best_alignment(fixed: Signal<'_>, moved: Signal<'_>) -> Option<Alignment>
 }
 
 /// Time at which a signal first comes to a level, s, between two samples by a line. None where it never does.
+///
+/// ```
+/// use flqr_core::record::{Signal, first_crossing_s};
+///
+/// let signal = Signal { time_s: &[0.0, 1.0, 2.0], values: &[0.0, 0.0, 4.0] };
+/// assert_eq!(first_crossing_s(signal, 1.0), Some(1.25));
+/// ```
 pub fn first_crossing_s(signal: Signal<'_>, level: f64) -> Option<f64> {
     let samples = Samples::of(signal)?;
     let before = samples.values[0] < level;
@@ -97,7 +117,7 @@ impl Samples {
     }
 }
 
-/// Of both where they lie on each other; none where either is constant there.
+/// Of both where they lie on each other; `None` if either is constant there.
 fn correlation(fixed: &Samples, moved: &Samples, shift_s: f64) -> Option<f64> {
     let from = fixed.start().max(moved.start() + shift_s);
     let to = fixed.end().min(moved.end() + shift_s);

@@ -41,8 +41,9 @@ impl Cells {
     /// Reads a row; false where it is to be dropped, and then the problems say why.
     pub(super) fn read(&mut self, row: &Row) -> bool {
         if row.torn {
-            self.problems
-                .add(row.line, "", || "the recording was cut off in this row, it was dropped".to_owned());
+            self.problems.add(row.line, "", || {
+                "the recording ends in the middle of this row, which was skipped".to_owned()
+            });
             return false;
         }
         self.parse(row) && self.scales(row.line)
@@ -83,12 +84,12 @@ impl Cells {
         problems.kept.truncate(before);
         problems.count = before;
         problems.add(row.line, "", || {
-            format!("the row has {count} cells where the header has {wanted}, it was dropped")
+            format!("the row has {count} cells, but the header has {wanted}; it was skipped")
         });
         false
     }
 
-    /// Whether the factors of the map leave every required value finite.
+    /// Returns whether the factors of the map leave every required value finite.
     fn scales(&mut self, line: u64) -> bool {
         let Self { plan, header, row, problems, .. } = self;
         let mut usable = true;
@@ -113,7 +114,7 @@ fn parse_number(cell: &[u8]) -> Option<f64> {
     std::str::from_utf8(cell).ok()?.parse().ok()
 }
 
-/// Whether a cell without a finite number is worth a problem. An empty cell, and NaN, is how a recorder says
+/// Returns whether a cell without a finite number is worth a problem. An empty cell, and NaN, is how a recorder says
 /// that there is no value of an optional column.
 fn is_damage(cell: &[u8], value: f64, need: Need) -> bool {
     match need {
@@ -132,7 +133,7 @@ fn complaint(cell: &[u8], need: Need) -> String {
             Ok(value) if value.is_finite() => format!("`{text}` is too large for a measurement"),
             Ok(_) => format!("`{text}` is not a finite number"),
             Err(_) if text.replacen(',', ".", 1).parse::<f64>().is_ok() => {
-                format!("`{text}` has a decimal comma where a point belongs")
+                format!("`{text}` has a decimal comma instead of a point")
             }
             Err(_) => format!("`{}` is not a number", text.chars().take(SHOWN).collect::<String>()),
         },
@@ -140,7 +141,7 @@ fn complaint(cell: &[u8], need: Need) -> String {
     format!("{what}, {}", outcome(need))
 }
 
-/// What damage does to a row.
+/// Effect of damage on a row.
 fn outcome(need: Need) -> &'static str {
-    if need == Need::Required { "the row was dropped" } else { "the value is left out" }
+    if need == Need::Required { "the row was skipped" } else { "the value is left out" }
 }

@@ -1,4 +1,4 @@
-//! Why a log could not be read.
+//! Reason why a log could not be read.
 
 use std::fmt;
 
@@ -13,7 +13,7 @@ pub struct LineProblem {
     pub line: u64,
     /// The file's column, or nothing where the whole row is meant.
     pub column: String,
-    /// What is wrong there, and what was done about it.
+    /// Problem there, and its handling.
     pub problem: String,
 }
 
@@ -27,7 +27,7 @@ impl fmt::Display for LineProblem {
     }
 }
 
-/// Where `count` problems are, by their columns and lines, of which these were kept.
+/// Describes the locations of `count` problems, of which these are stored.
 pub(super) fn places(problems: &[LineProblem], count: usize) -> String {
     const LINES: usize = 4;
     let mut columns: Vec<(&str, Vec<u64>)> = Vec::new();
@@ -48,18 +48,18 @@ pub(super) fn places(problems: &[LineProblem], count: usize) -> String {
     if count > problems.len() { format!("the first {} of them {told}", problems.len()) } else { told }
 }
 
-/// Why a log could not be read; `file` is the name that the user gave it.
+/// Reason why a log could not be read; `file` is its name as given by the user.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LogError {
     /// The reader failed.
-    #[error("{file}: reading stopped after line {line} ({problem}), check the disk or copy the file again")]
+    #[error("{file}: reading stopped after line {line} ({problem}): check the disk or copy the file again")]
     Io {
         /// The file.
         file: String,
         /// Last line that was read.
         line: u64,
-        /// What the system said.
+        /// Message of the system.
         problem: String,
     },
     /// A folder in place of a file.
@@ -69,7 +69,7 @@ pub enum LogError {
         file: String,
     },
     /// The caller said stop.
-    #[error("{file}: reading was cancelled at line {line}, nothing was kept")]
+    #[error("{file}: reading was cancelled at line {line}")]
     Cancelled {
         /// The file.
         file: String,
@@ -85,7 +85,7 @@ pub enum LogError {
         file: String,
     },
     /// A header without rows.
-    #[error("{file}:{line}: there is a header but no row of numbers below it, record the log again")]
+    #[error("{file}:{line}: there is a header but no row of numbers below it: record the log again")]
     HeaderOnly {
         /// The file.
         file: String,
@@ -93,18 +93,18 @@ pub enum LogError {
         line: u64,
     },
     /// Bytes that no CSV has.
-    #[error("{file}:{line} is not CSV text ({found}), export the log as comma-separated UTF-8 text")]
+    #[error("{file}:{line} is not CSV text ({found}): export the log as comma-separated UTF-8 text")]
     NotText {
         /// The file.
         file: String,
         /// Line at which it shows.
         line: u64,
-        /// What it looks like.
+        /// Apparent format.
         found: &'static str,
     },
     /// The first row holds numbers.
     #[error(
-        "{file}:{line}: the first row holds numbers where the names of the columns belong, add a header \
+        "{file}:{line}: the first row contains numbers instead of column names: add a header \
          line without a leading #"
     )]
     NoHeader {
@@ -114,7 +114,7 @@ pub enum LogError {
         line: u64,
     },
     /// Two columns of one name that matters.
-    #[error("{file}:{line}: two columns are named `{column}`, rename one of them")]
+    #[error("{file}:{line}: two columns are named `{column}`: rename one of them")]
     DuplicateColumn {
         /// The file.
         file: String,
@@ -125,7 +125,7 @@ pub enum LogError {
     },
     /// The columns are not complete for any kind of log.
     #[error(
-        "{file}: a {kind} needs `{missing}`, the file has {present}; name its own column with --map {example}"
+        "{file}: a {kind} needs `{missing}`, but the file has {present}: map its column with --map {example}"
     )]
     MissingColumns {
         /// The file.
@@ -136,11 +136,13 @@ pub enum LogError {
         missing: String,
         /// The columns that are there.
         present: String,
-        /// An entry of a column map that might mend it.
+        /// An entry of a column map that might remedy it.
         example: String,
     },
     /// The column map names a column that the file does not have.
-    #[error("{file}: the column map `{mapping}` reads `{theirs}`, the file has {present}; correct the name")]
+    #[error(
+        "{file}: the column map `{mapping}` reads `{theirs}`, but the file has {present}: correct the name"
+    )]
     MappedColumnMissing {
         /// The file.
         file: String,
@@ -153,7 +155,7 @@ pub enum LogError {
     },
     /// Most rows could not be used.
     #[error(
-        "{file}: {bad} of {rows} rows cannot be used, the first at {problems}; correct them, or record the log again"
+        "{file}: {bad} of {rows} rows cannot be used, the first at {problems}: correct them, or record the log again"
     )]
     MostlyBad {
         /// The file.
@@ -167,8 +169,8 @@ pub enum LogError {
     },
     /// Time repeats or runs back too often to drop the rows.
     #[error(
-        "{file}:{line}: column `time_s` goes from {from_s} s to {to_s} s, and {rows} rows in all do not follow \
-         the time before them; {mend}"
+        "{file}:{line}: column `time_s` goes from {from_s} s to {to_s} s; {rows} rows in total \
+         do not increase in time: {remedy}"
     )]
     TimeRunsBack {
         /// The file.
@@ -181,13 +183,13 @@ pub enum LogError {
         to_s: f64,
         /// Rows that would have to be dropped.
         rows: usize,
-        /// How it is mended.
-        mend: &'static str,
+        /// Remedy.
+        remedy: &'static str,
     },
     /// More numbers than the limit.
     #[error(
-        "{file}:{line}: the log holds more than the limit of {limit} numbers ({mebibytes} MiB), split the file \
-         or remove columns and rows that are not needed"
+        "{file}:{line}: the log has more than {limit} numbers ({mebibytes} MiB): split the \
+         file, or remove unused columns and rows"
     )]
     TooLarge {
         /// The file.
@@ -201,7 +203,7 @@ pub enum LogError {
     },
     /// One row that does not end.
     #[error(
-        "{file}:{line}: this row is longer than {limit} bytes, look for a quote that is left open or a missing line end"
+        "{file}:{line}: this row is longer than {limit} bytes: look for an unclosed quote or a missing line end"
     )]
     RowTooLong {
         /// The file.

@@ -1,4 +1,4 @@
-//! What is wrong with a log, in plain sentences.
+//! Data-health checks of a log.
 
 mod clock;
 mod excitation;
@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::{Log, LogError, LogKind, schema};
 use crate::message;
 
-/// How much a finding matters.
+/// Severity of a finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Severity {
@@ -26,21 +26,21 @@ pub enum Severity {
 /// One finding about a log.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct HealthFinding {
-    /// How much it matters.
+    /// Severity.
     pub severity: Severity,
     /// The column, or nothing where the whole log is meant.
     pub column: String,
-    /// What is wrong.
+    /// Problem.
     pub problem: String,
-    /// What to do about it; nothing where nothing has to be done.
-    pub mend: String,
+    /// Remedy; empty if none is needed.
+    pub remedy: String,
 }
 
 impl HealthFinding {
     /// A finding; its words, which may quote the file, are made fit to be shown.
-    pub fn new(severity: Severity, column: &str, problem: impl AsRef<str>, mend: impl AsRef<str>) -> Self {
-        let [problem, mend] = [problem.as_ref(), mend.as_ref()].map(message::shown);
-        Self { severity, column: column.to_owned(), problem, mend }
+    pub fn new(severity: Severity, column: &str, problem: impl AsRef<str>, remedy: impl AsRef<str>) -> Self {
+        let [problem, remedy] = [problem.as_ref(), remedy.as_ref()].map(message::shown);
+        Self { severity, column: column.to_owned(), problem, remedy }
     }
 }
 
@@ -55,7 +55,7 @@ impl std::fmt::Display for HealthFinding {
             write!(f, "{}: ", self.column)?;
         }
         f.write_str(&self.problem)?;
-        if self.mend.is_empty() { Ok(()) } else { write!(f, "; {}", self.mend) }
+        if self.remedy.is_empty() { Ok(()) } else { write!(f, "; {}", self.remedy) }
     }
 }
 
@@ -68,24 +68,32 @@ const POSITIONS: [&str; 5] =
 struct Findings(Vec<HealthFinding>);
 
 impl Findings {
-    fn add(&mut self, severity: Severity, column: &str, problem: impl AsRef<str>, mend: impl AsRef<str>) {
-        self.0.push(HealthFinding::new(severity, column, problem, mend));
+    fn add(&mut self, severity: Severity, column: &str, problem: impl AsRef<str>, remedy: impl AsRef<str>) {
+        self.0.push(HealthFinding::new(severity, column, problem, remedy));
     }
 
     fn info(&mut self, column: &str, problem: impl AsRef<str>) {
         self.add(Severity::Info, column, problem, "");
     }
 
-    fn warn(&mut self, column: &str, problem: impl AsRef<str>, mend: impl AsRef<str>) {
-        self.add(Severity::Warning, column, problem, mend);
+    fn warn(&mut self, column: &str, problem: impl AsRef<str>, remedy: impl AsRef<str>) {
+        self.add(Severity::Warning, column, problem, remedy);
     }
 }
 
-/// What is wrong with a log, the gravest first.
+/// Returns the problems of a log, the most severe first.
 ///
 /// Looks at completeness, dropped rows, the clock (rate, jitter, gaps, order), each column of the schema
 /// (missing values, held samples, steps, saturation, standstill, wrapped angles, spikes), units (degrees, revolutions,
 /// raw counts) and at what the motion excites. A log without faults has infos only.
+///
+/// ```
+/// use flqr_core::record::{Log, Severity, data_health};
+///
+/// let columns = [("time_s", vec![0.0, 0.001]), ("motor_angle_rad", vec![0.0, 0.1])];
+/// let findings = data_health(&Log::from_columns("log.csv", columns));
+/// assert!(findings.iter().any(|finding| finding.severity == Severity::Error)); // There is no torque.
+/// ```
 pub fn data_health(log: &Log) -> Vec<HealthFinding> {
     let mut findings = Findings::default();
     let kind = kind(log, &mut findings);
@@ -115,8 +123,8 @@ fn kind(log: &Log, findings: &mut Findings) -> Option<LogKind> {
         Ok(kind) => Some(kind),
         Err(LogError::MissingColumns { kind, missing, example, .. }) => {
             let problem = format!("a {kind} needs `{missing}`, which the log does not have");
-            let mend = format!("name the file's own column with --map {example}");
-            findings.add(Severity::Error, &missing, problem, mend);
+            let remedy = format!("map its column with --map {example}");
+            findings.add(Severity::Error, &missing, problem, remedy);
             None
         }
         Err(error) => {
@@ -135,10 +143,10 @@ fn dropped_rows(log: &Log, findings: &mut Findings) {
     let were = if log.dropped_rows == 1 { "was" } else { "were" };
     let rows = rows(log.rows() + log.dropped_rows);
     let problem = format!(
-        "{unused} could not be used and {} of {rows} {were} dropped, the first at {first}",
+        "{unused} could not be used and {} of {rows} {were} skipped, the first at {first}",
         log.dropped_rows
     );
-    findings.warn(&first.column, problem, "correct the file where it is damaged, or record it again");
+    findings.warn(&first.column, problem, "correct the damaged part of the file, or record it again");
 }
 
 /// A number of rows in words.

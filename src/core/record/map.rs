@@ -24,7 +24,7 @@ pub struct Mapping {
     pub ours: String,
     /// The file's column.
     pub theirs: String,
-    /// What the file's values are multiplied with, ours / theirs.
+    /// Factor from the file's values to the signal.
     pub factor: f64,
 }
 
@@ -35,14 +35,14 @@ pub struct ColumnMap {
     entries: Vec<Mapping>,
 }
 
-/// Why a column map is refused.
+/// Reason why a column map is refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MapError {
-    /// No `=`, or nothing beside it.
+    /// No `=`, or nothing next to it.
     #[error(
-        "column map `{entry}` is not of the form ours=theirs or ours=theirs*factor, as in \
-         torque_nm=current_a*0.32"
+        "column map `{entry}` must have the form signal=column or signal=column*factor, \
+         such as torque_nm=current_a*0.32"
     )]
     Form {
         /// The entry as it was written.
@@ -50,16 +50,16 @@ pub enum MapError {
     },
     /// A factor that is not a usable number.
     #[error(
-        "factor `{factor}` in the column map `{entry}` must be a finite number other than 0, as in *0.32"
+        "factor `{factor}` in the column map `{entry}` must be a finite number other than 0, such as *0.32"
     )]
     Factor {
         /// The entry as it was written.
         entry: String,
-        /// What stands behind the `*`.
+        /// Text after the `*`.
         factor: String,
     },
     /// A name on the left that no log has.
-    #[error("column map for `{ours}`: no log has such a column, the name on the left must be one of {known}")]
+    #[error("column map for `{ours}`: unknown signal; the name on the left must be one of {known}")]
     UnknownColumn {
         /// The name on the left.
         ours: String,
@@ -67,7 +67,7 @@ pub enum MapError {
         known: String,
     },
     /// Two entries for one of our columns.
-    #[error("column map for `{ours}` is given twice, keep one of `{first}` and `{second}`")]
+    #[error("column map for `{ours}` is given twice: keep either `{first}` or `{second}`")]
     Twice {
         /// The name on the left.
         ours: String,
@@ -173,9 +173,9 @@ mod tests {
     #[test]
     fn broken_entries_name_the_mend() {
         for (text, expected) in [
-            ("torque_nm", "is not of the form"),
-            ("=current_a", "is not of the form"),
-            ("torque_nm=*2", "is not of the form"),
+            ("torque_nm", "must have the form"),
+            ("=current_a", "must have the form"),
+            ("torque_nm=*2", "must have the form"),
             ("torque_nm=current_a*", "factor ``"),
             ("torque_nm=current_a*0", "must be a finite number other than 0"),
             ("torque_nm=current_a*two", "factor `two`"),
@@ -193,7 +193,7 @@ mod tests {
         let message = ColumnMap::new(entries.to_vec()).unwrap_err().to_string();
         assert_eq!(
             message,
-            "column map for `torque_nm` is given twice, keep one of `torque_nm=a` and `torque_nm=b*2`"
+            "column map for `torque_nm` is given twice: keep either `torque_nm=a` or `torque_nm=b*2`"
         );
     }
 }

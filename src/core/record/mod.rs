@@ -4,7 +4,7 @@
 //! ([`schema`] lists the names), other columns are kept and ignored. `#` starts a comment line. Where the
 //! header has no comma, semicolons or tabs separate the cells.
 //!
-//! What happens with damaged input ([`read_log`]):
+//! Handling of damaged input ([`read_log`]):
 //! - A row with too few or too many cells, or with a cell that is not a finite number (of at most 1e30) in a required column,
 //!   is dropped; [`Log::problems`] names line and column. Consumers may rely on required columns being finite.
 //! - The same in an optional column of the schema leaves the row, with NaN as the value.
@@ -22,6 +22,7 @@ mod map;
 pub mod mcap;
 mod plan;
 mod read;
+mod readings;
 pub mod recording;
 mod replay;
 mod rows;
@@ -38,6 +39,7 @@ pub use error::{LineProblem, LogError};
 pub use health::{HealthFinding, Severity, data_health};
 pub use map::{ColumnMap, MapError, Mapping};
 pub use read::{ReadOptions, ReadProgress, read_log};
+pub use readings::Readings;
 pub use replay::{Replay, ReplayCounts, ReplayError, ReplayFile, ReplayItem};
 pub use rows::{LogItem, LogRows};
 pub use sample::{BenchSample, Sample};
@@ -68,7 +70,7 @@ pub struct Log {
     pub problems: Vec<LineProblem>,
     /// All problems, those beyond the kept ones included.
     pub problem_count: usize,
-    /// Where the rows stand in the file; empty for a log that was not read from one.
+    /// Line numbers of the rows in the file; empty for a log that was not read from one.
     lines: RowLines,
 }
 
@@ -92,10 +94,19 @@ impl RowLines {
 }
 
 impl Log {
-    /// How many problems are kept with line and column.
+    /// Number of problems stored with line and column.
     pub const KEPT_PROBLEMS: usize = 100;
 
     /// A log of these columns; shorter ones are filled up with NaN.
+    ///
+    /// ```
+    /// use flqr_core::record::{Log, LogKind};
+    ///
+    /// let log = Log::from_columns("pairs.csv", [("speed_rad_s", vec![1.0, 2.0]), ("torque_nm", vec![0.2, 0.3])]);
+    /// assert_eq!((log.kind()?, log.rows()), (LogKind::FrictionPairs, 2));
+    /// assert_eq!(log.column("torque_nm"), Some(&[0.2, 0.3][..]));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn from_columns<N: Into<String>>(
         source: impl Into<String>,
         columns: impl IntoIterator<Item = (N, Vec<f64>)>,
@@ -136,12 +147,12 @@ impl Log {
         self.columns.first().map_or(0, |column| column.values.len())
     }
 
-    /// Whether the columns are complete for a kind. A log may serve several kinds: a model then says which.
+    /// Returns whether the columns are complete for a kind. A log may serve several kinds: a model then says which.
     pub fn serves(&self, kind: LogKind) -> bool {
         kind.fits(|name| self.column(name).is_some())
     }
 
-    /// What the log records, from its columns: the first of [`LogKind::ALL`] that is complete.
+    /// Returns the kind of log from its columns: the first of [`LogKind::ALL`] that is complete.
     ///
     /// # Errors
     /// [`LogError::MissingColumns`] for the kind that the columns come nearest to.
@@ -206,7 +217,7 @@ fn map_example(missing: &[&str], present: &[&str]) -> String {
     entries.join(" --map ")
 }
 
-/// How much a file's column is like one of ours: whether it is a measured one, and what they have in
+/// Similarity of a file's column to a signal: whether it is a measured one, and what they have in
 /// common, a unit counting half a word.
 fn resemblance(ours: &str, theirs: &str) -> (bool, usize) {
     const UNITS: [&str; 8] = ["rad_s", "m_s", "rad", "nm", "m", "s", "n", "c"];

@@ -3,7 +3,7 @@
 use super::text::Header;
 use super::{ColumnMap, LogError, LogKind, Mapping, listed, schema};
 
-/// How much a cell matters.
+/// Importance of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Need {
     /// Outside the schema: anything that is not a number is NaN.
@@ -25,7 +25,7 @@ pub(super) struct Target {
 /// Which cells of a file become which columns of a log.
 pub(super) struct Plan {
     pub(super) targets: Vec<Target>,
-    /// How much each of the file's columns matters.
+    /// Importance of each column of the file.
     pub(super) needs: Vec<Need>,
 }
 

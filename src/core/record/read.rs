@@ -11,10 +11,10 @@ use super::{ColumnMap, Log, LogError};
 /// Progress is reported about this often.
 const WATCH_BYTES: u64 = 1 << 16;
 
-/// How a log is read.
+/// Options for reading a log.
 #[derive(Clone, Copy, Debug)]
 pub struct ReadOptions<'a> {
-    /// How the file's columns become ours.
+    /// Column map.
     pub map: &'a ColumnMap,
     /// Largest number of values in memory, all columns together, 8 bytes each.
     pub max_values: usize,
@@ -30,7 +30,7 @@ impl<'a> ReadOptions<'a> {
     }
 }
 
-/// How far reading has come.
+/// Progress of reading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ReadProgress {
     /// Bytes taken from the reader.
@@ -44,6 +44,18 @@ pub struct ReadProgress {
 ///
 /// # Errors
 /// See [`LogError`]; the head of [`crate::record`] says which damage is an error and which a problem of a line.
+///
+/// ```
+/// use std::ops::ControlFlow;
+///
+/// use flqr_core::record::{ColumnMap, ReadOptions, read_log};
+///
+/// let text = "time_s,motor_angle_rad,current_a\n0.000,0.0,0.5\n0.001,0.1,0.5\n";
+/// let map = ColumnMap::new(vec!["torque_nm=current_a*0.32".parse()?])?;
+/// let log = read_log(text.as_bytes(), "log.csv", &ReadOptions::new(&map), &mut |_| ControlFlow::Continue(()))?;
+/// assert_eq!(log.column("torque_nm"), Some(&[0.16, 0.16][..]));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn read_log(
     reader: impl BufRead,
     source: &str,

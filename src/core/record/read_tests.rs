@@ -61,15 +61,14 @@ fn kinds_are_recognised() {
     let half = read("speed_rad_s,torque\n1,2\n", &[]).unwrap().kind().unwrap_err().to_string();
     assert_eq!(
         half,
-        "run.csv: a file of friction pairs needs `torque_nm`, the file has `speed_rad_s`, `torque`; name its own \
-         column with --map torque_nm=torque"
+        "run.csv: a file of friction pairs needs `torque_nm`, but the file has `speed_rad_s`, `torque`: map its column with --map torque_nm=torque"
     );
     // Samples of a motion are not pairs.
     let motion = read("time_s,speed_rad_s,torque_nm,angle_rad\n0,1,2,3\n", &[]).unwrap();
     assert_eq!(
         motion.kind().unwrap_err().to_string(),
-        "run.csv: a bench log needs `motor_angle_rad`, the file has `time_s`, `speed_rad_s`, `torque_nm`, \
-         `angle_rad`; name its own column with --map motor_angle_rad=angle_rad"
+        "run.csv: a bench log needs `motor_angle_rad`, but the file has `time_s`, `speed_rad_s`, `torque_nm`, \
+         `angle_rad`: map its column with --map motor_angle_rad=angle_rad"
     );
 }
 
@@ -116,7 +115,7 @@ fn a_map_reads_the_columns_of_the_file() {
     assert_eq!(log.column("time_s"), Some(&[0.0, 0.001, 0.002][..]));
     assert_eq!(
         log.problems[0].to_string(),
-        "line 3, column `t_ms`: `x` is not a number, the row was dropped"
+        "line 3, column `t_ms`: `x` is not a number, the row was skipped"
     );
 }
 
@@ -132,7 +131,7 @@ fn a_factor_that_overflows_a_value_drops_the_row() {
     assert_eq!((log.dropped_rows, log.problem_count), (1, 2));
     assert_eq!(
         log.problems[0].to_string(),
-        "line 3, column `current_a`: 1e25 times 1e10 is too large for a measurement, the row was dropped"
+        "line 3, column `current_a`: 1e25 times 1e10 is too large for a measurement, the row was skipped"
     );
     assert!(log.problems[1].to_string().ends_with("the value is left out"), "{}", log.problems[1]);
 }
@@ -148,55 +147,55 @@ fn isolated_damage_becomes_a_problem_with_line_and_column() {
         (
             "0.010,abc,1,20",
             1,
-            "line 13, column `motor_angle_rad`: `abc` is not a number, the row was dropped",
+            "line 13, column `motor_angle_rad`: `abc` is not a number, the row was skipped",
         ),
-        ("0.010,,1,20", 1, "line 13, column `motor_angle_rad`: the cell is empty, the row was dropped"),
+        ("0.010,,1,20", 1, "line 13, column `motor_angle_rad`: the cell is empty, the row was skipped"),
         (
             "0.010,0.5,NaN,20",
             1,
-            "line 13, column `torque_nm`: `NaN` is not a finite number, the row was dropped",
+            "line 13, column `torque_nm`: `NaN` is not a finite number, the row was skipped",
         ),
         (
             "0.010,0.5,-inf,20",
             1,
-            "line 13, column `torque_nm`: `-inf` is not a finite number, the row was dropped",
+            "line 13, column `torque_nm`: `-inf` is not a finite number, the row was skipped",
         ),
         (
             "0.010,0.5,1e999,20",
             1,
-            "line 13, column `torque_nm`: `1e999` is not a finite number, the row was dropped",
+            "line 13, column `torque_nm`: `1e999` is not a finite number, the row was skipped",
         ),
         (
             "0.010,0.5,\"1,5\",20",
             1,
-            "line 13, column `torque_nm`: `1,5` has a decimal comma where a point belongs, the row was dropped",
+            "line 13, column `torque_nm`: `1,5` has a decimal comma instead of a point, the row was skipped",
         ),
         (
             "0.010,0.5,\u{0}\u{1},20",
             1,
-            "line 13, column `torque_nm`: `\u{0}\u{1}` is not a number, the row was dropped",
+            "line 13, column `torque_nm`: `\u{0}\u{1}` is not a number, the row was skipped",
         ),
-        ("0.010,0.5", 1, "line 13: the row has 2 cells where the header has 4, it was dropped"),
-        ("0.010,0.5,1,20,7", 1, "line 13: the row has 5 cells where the header has 4, it was dropped"),
+        ("0.010,0.5", 1, "line 13: the row has 2 cells, but the header has 4; it was skipped"),
+        ("0.010,0.5,1,20,7", 1, "line 13: the row has 5 cells, but the header has 4; it was skipped"),
         (
             "time_s,motor_angle_rad,torque_nm,motor_temperature_c",
             1,
-            "line 13, column `time_s`: `time_s` is not a number, the row was dropped",
+            "line 13, column `time_s`: `time_s` is not a number, the row was skipped",
         ),
         (
             "0.004,0.5,1,20",
             1,
-            "line 13, column `time_s`: 0.004 s does not fit between the times around it, the row was dropped",
+            "line 13, column `time_s`: 0.004 s is not between the times around it; the row was skipped",
         ),
         (
             "0.009,0.5,1,20",
             1,
-            "line 12, column `time_s`: 0.009 s does not fit between the times around it, the row was dropped",
+            "line 12, column `time_s`: 0.009 s is not between the times around it; the row was skipped",
         ),
         (
             "99,0.5,1,20",
             1,
-            "line 13, column `time_s`: 99 s does not fit between the times around it, the row was dropped",
+            "line 13, column `time_s`: 99 s is not between the times around it; the row was skipped",
         ),
         (
             "0.010,0.5,1,hot",
@@ -233,21 +232,18 @@ fn files_that_are_no_logs_are_refused_with_place_and_mend() {
         ("\n# only a comment\n\n".into(), "run.csv is empty: "),
         ("time_s,torque_nm\n".into(), "run.csv:1: there is a header but no row of numbers below it"),
         ("# c\n\ntime_s,torque_nm".into(), "run.csv:3: there is a header but no row"),
-        (
-            "0,1,2\n1,2,3\n".into(),
-            "run.csv:1: the first row holds numbers where the names of the columns belong",
-        ),
+        ("0,1,2\n1,2,3\n".into(), "run.csv:1: the first row contains numbers instead of column names"),
         (
             "\u{1f}\u{8b}\u{8}zipped\rinside".into(),
             "run.csv:1 is not CSV text (it has bytes of a binary or compressed",
         ),
         (
             "time_s,a\r0,1\r".into(),
-            "run.csv:1 is not CSV text (its lines end in bare carriage returns), export",
+            "run.csv:1 is not CSV text (its lines end in bare carriage returns): export",
         ),
         (
             "time_s,torque_nm,torque_nm\n0,1,2\n".into(),
-            "run.csv:1: two columns are named `torque_nm`, rename one",
+            "run.csv:1: two columns are named `torque_nm`: rename one",
         ),
         (
             rows("0.1,x,2\n", 9),
@@ -257,25 +253,23 @@ fn files_that_are_no_logs_are_refused_with_place_and_mend() {
         (
             rows("0.1,x,2\n", 2),
             "run.csv: 2 of 2 rows cannot be used, the first at line 2, column `motor_angle_rad`: `x` is not a number, the \
-             row was dropped; in all `motor_angle_rad` at lines 2, 3; correct them, or record the log again",
+             row was skipped; `motor_angle_rad` at lines 2, 3 in total: correct them, or record the log again",
         ),
         (
             rows("0.5,1,2\n", 9),
-            "run.csv:3: column `time_s` goes from 0.5 s to 0.5 s, and 8 rows in all do not follow the time before \
-             them; write the time with more digits, or keep one row for each time",
+            "run.csv:3: column `time_s` goes from 0.5 s to 0.5 s; 8 rows in total do not increase in time: write the time with more digits, or keep one row for each time",
         ),
         (
             format!("time_s,motor_angle_rad,torque_nm\n{restart}"),
-            "run.csv:12: column `time_s` goes from 9 s to 0 s, and 10 rows in all do not follow the time before \
-             them; split the file where the time starts again",
+            "run.csv:12: column `time_s` goes from 9 s to 0 s; 10 rows in total do not increase in time: split the file where the time restarts",
         ),
         (
             "time_s;motor_angle_rad;torque_nm\n0,1;0,5;1,2\n".into(),
-            "`0,1` has a decimal comma where a point belongs",
+            "`0,1` has a decimal comma instead of a point",
         ),
         (
             format!("a,b\n\"{}", "x".repeat(1 << 20)),
-            "run.csv:2: this row is longer than 1048576 bytes, look for a quote",
+            "run.csv:2: this row is longer than 1048576 bytes: look for an unclosed quote",
         ),
     ] {
         let message = read(&text, &[]).unwrap_err().to_string();
@@ -287,8 +281,8 @@ fn files_that_are_no_logs_are_refused_with_place_and_mend() {
     let message = read(PLAIN, &["torque_nm=current"]).unwrap_err().to_string();
     assert_eq!(
         message,
-        "run.csv: the column map `torque_nm=current` reads `current`, the file has `time_s`, \
-         `motor_angle_rad`, `torque_nm`; correct the name"
+        "run.csv: the column map `torque_nm=current` reads `current`, but the file has `time_s`, \
+         `motor_angle_rad`, `torque_nm`: correct the name"
     );
 }
 
@@ -339,8 +333,7 @@ fn the_limit_of_memory_is_named() {
     let result = read_log(text.as_bytes(), "big.csv", &options, &mut |_| ControlFlow::Continue(()));
     assert_eq!(
         result.unwrap_err().to_string(),
-        "big.csv:13: the log holds more than the limit of 30 numbers (0 MiB), split the file or remove columns \
-         and rows that are not needed"
+        "big.csv:13: the log has more than 30 numbers (0 MiB): split the file, or remove unused columns and rows"
     );
 }
 
@@ -358,7 +351,7 @@ fn a_reader_that_fails_is_reported() {
     let message = result.unwrap_err().to_string();
     assert_eq!(
         message,
-        "usb.csv: reading stopped after line 3 (cable pulled), check the disk or copy the file again"
+        "usb.csv: reading stopped after line 3 (cable pulled): check the disk or copy the file again"
     );
 }
 

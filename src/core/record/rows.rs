@@ -11,7 +11,7 @@ use super::text::{Header, Line, Lines};
 use super::{ColumnMap, LineProblem, LogError, LogKind, recording};
 
 /// Reads a log row by row, so that its length is no matter. Damage is told as by [`super::read_log`], but which
-/// rows do not follow in time is judged by their neighbours only.
+/// rows do not follow in time is assessed by their neighbours only.
 pub struct LogRows<'a, R> {
     lines: Lines<'a, R>,
     cells: Cells,
@@ -29,7 +29,7 @@ pub struct LogRows<'a, R> {
     dropped: u64,
 }
 
-/// What a log holds.
+/// Contents of a log.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LogItem<'a> {
     /// A row: one value for each of [`LogRows::columns`], NaN where there is none; their times rise.
@@ -69,7 +69,7 @@ impl<'a, R: BufRead> LogRows<'a, R> {
         self.time
     }
 
-    /// What `time_s` counts from, since 1970; only a recording says so.
+    /// Time zero of `time_s` since 1970; recordings only.
     pub fn start(&self) -> Option<Duration> {
         self.start
     }
@@ -153,7 +153,7 @@ impl<'a, R: BufRead> LogRows<'a, R> {
     fn drop_row(&mut self, time_s: f64, line: u64) {
         self.dropped += 1;
         self.cells.problems.add(line, "time_s", || {
-            format!("{time_s} s does not fit between the times around it, the row was dropped")
+            format!("{time_s} s is not between the times around it; the row was skipped")
         });
     }
 }
@@ -195,7 +195,7 @@ mod tests {
         let (rows, events, problems) = rows(text);
         assert_eq!(rows, [[0.0, 1.0, 2.0], [1.0, 3.0, 4.0]]);
         assert_eq!(events, ["500ms stop: done"]);
-        assert_eq!(problems, ["line 8: the recording was cut off in this row, it was dropped"]);
+        assert_eq!(problems, ["line 8: the recording ends in the middle of this row, which was skipped"]);
         let map = ColumnMap::default();
         let log = LogRows::new(text.as_bytes(), "run.csv", &map).unwrap();
         assert_eq!(log.start(), Some(Duration::from_micros(7_000_500)));
@@ -224,6 +224,6 @@ mod tests {
         let map = ColumnMap::default();
         let error = LogRows::new("speed_rad_s,torque_nm\n1,2\n".as_bytes(), "pairs.csv", &map).err().unwrap();
         let message = error.to_string();
-        assert!(message.contains("needs `time_s`, the file has `speed_rad_s`, `torque_nm`"), "{message}");
+        assert!(message.contains("needs `time_s`, but the file has `speed_rad_s`, `torque_nm`"), "{message}");
     }
 }

@@ -1,11 +1,10 @@
 //! Rows of a robot's recorder, simulated or real.
 
 use super::schema;
-use crate::control::Readings;
-use crate::identify::Motor;
-use crate::robot::State;
+use crate::model::{Motor, State};
+use crate::record::Readings;
 
-/// What the robot's recorder writes at one tick: measured values, and the torque that was asked of the
+/// Row of the robot's recorder: measured values, and the torque that was required of the
 /// motors. The columns are those of a robot log.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
@@ -34,7 +33,7 @@ pub struct Sample {
 }
 
 impl Sample {
-    /// A row of what was read, what was made of it, and the torque that was asked for then, left and right.
+    /// A row of what was read, what was made of it, and the torque that was requested then, left and right.
     pub fn new(time_s: f64, readings: &Readings, state: &State, asked_nm: [f64; 2]) -> Self {
         Self {
             time_s,
@@ -102,7 +101,7 @@ impl Sample {
     }
 }
 
-/// What is recorded of two motors with their wheels in the air, left then right; of a single shaft both
+/// Recorded signals of two motors with their wheels in the air, left then right; of a single shaft both
 /// entries are the same.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BenchSample {

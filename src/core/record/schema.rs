@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 
-/// What a log records, recognised from its columns.
+/// Kind of a log, recognised from its columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LogKind {
@@ -38,7 +38,7 @@ pub const ROBOT: [&str; 11] = [
 ];
 /// Required columns of a file of friction pairs.
 pub const FRICTION_PAIRS: &[&str] = &["speed_rad_s", "torque_nm"];
-/// Columns that a log may have beside the required ones.
+/// Columns that a log may have next to the required ones.
 pub const OPTIONAL: &[&str] = &[
     "motor_speed_rad_s",
     "motor_temperature_c",
@@ -64,20 +64,27 @@ impl LogKind {
         }
     }
 
-    /// Whether a file with these columns can be read as this kind.
+    /// Returns whether a file with these columns can be read as this kind.
     ///
-    /// Rows with a time stamp are samples of a motion, so `speed_rad_s` and `torque_nm` beside `time_s`
+    /// Rows with a time stamp are samples of a motion, so `speed_rad_s` and `torque_nm` next to `time_s`
     /// are not friction pairs.
     pub fn fits(self, has: impl Fn(&str) -> bool) -> bool {
         self.required().iter().all(|name| has(name)) && !(self == Self::FrictionPairs && has("time_s"))
     }
 
     /// The kind of a file with these columns, if they are complete for one.
+    ///
+    /// ```
+    /// use flqr_core::record::LogKind;
+    ///
+    /// let columns = ["time_s", "position_m", "force_n", "velocity_m_s"];
+    /// assert_eq!(LogKind::recognise(|name| columns.contains(&name)), Some(LogKind::LinearAxis));
+    /// ```
     pub fn recognise(has: impl Fn(&str) -> bool) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| kind.fits(&has))
     }
 
-    /// The kind that a file with these columns most probably was meant to be: the largest share of
+    /// The kind that a file with these columns most probably was meant to be: the largest fraction of
     /// required columns, the kind with fewer columns first. Time alone says nothing; speeds without time are
     /// pairs.
     pub(crate) fn nearest(has: impl Fn(&str) -> bool) -> Self {
@@ -110,7 +117,7 @@ impl fmt::Display for LogKind {
     }
 }
 
-/// Whether a name is one of the schema.
+/// Returns whether a name is one of the schema.
 pub fn is_known(name: &str) -> bool {
     known().any(|known| known == name)
 }

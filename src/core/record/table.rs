@@ -69,7 +69,7 @@ impl Table {
             Some(first) if dropped_rows * 2 > rows => {
                 let problems = match problems.len() {
                     1 => first.to_string(),
-                    _ => format!("{first}; in all {}", places(&problems, problem_count)),
+                    _ => format!("{first}; {} in total", places(&problems, problem_count)),
                 };
                 return Err(LogError::MostlyBad { file: file.to_owned(), bad: dropped_rows, rows, problems });
             }
@@ -93,14 +93,21 @@ impl Table {
         // A glitch of the recorder is a few rows; more is a file of another making.
         if rows.len() > 3.max(self.kept() / 100) {
             let (file, line, rows) = (file.to_owned(), self.line_of(first), rows.len());
-            return Err(LogError::TimeRunsBack { file, line, from_s, to_s, rows, mend: mend(from_s, to_s) });
+            return Err(LogError::TimeRunsBack {
+                file,
+                line,
+                from_s,
+                to_s,
+                rows,
+                remedy: remedy(from_s, to_s),
+            });
         }
         for &row in &rows {
             let time = self.columns[column][row];
             let line = self.line_of(row);
             let name = &self.cells.header.names[self.cells.plan.targets[column].from];
             self.cells.problems.add(line, name, || {
-                format!("{time} s does not fit between the times around it, the row was dropped")
+                format!("{time} s is not between the times around it; the row was skipped")
             });
         }
         let mut lines: Vec<u64> = (0..self.kept()).map(|row| self.line_of(row)).collect();
@@ -115,11 +122,11 @@ impl Table {
     }
 }
 
-fn mend(from_s: f64, to_s: f64) -> &'static str {
+fn remedy(from_s: f64, to_s: f64) -> &'static str {
     if from_s == to_s {
         "write the time with more digits, or keep one row for each time"
     } else {
-        "split the file where the time starts again"
+        "split the file where the time restarts"
     }
 }
 

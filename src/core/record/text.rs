@@ -16,7 +16,7 @@ pub(super) struct Lines<'a, R> {
     buffer: Vec<u8>,
     line: u64,
     bytes: u64,
-    /// Whether every row of the file was written with its line end, so that one without was cut.
+    /// True if every row of the file was written with its line end, so that one without was cut.
     grows: bool,
 }
 
@@ -32,7 +32,7 @@ pub(super) enum Line<'a> {
 pub(super) struct Row<'a> {
     pub(super) text: &'a [u8],
     pub(super) line: u64,
-    /// Whether the end of the row is missing, as far as that can be known.
+    /// True if the end of the row is missing, as far as that can be known.
     pub(super) torn: bool,
 }
 
@@ -160,7 +160,7 @@ pub(super) struct Header {
     pub(super) names: Vec<String>,
     /// Line of the header, from 1.
     pub(super) line: u64,
-    /// What separates the cells.
+    /// Separator of the cells.
     pub(super) delimiter: u8,
 }
 
@@ -200,7 +200,7 @@ fn delimiter(header: &[u8]) -> u8 {
     *b",;\t".iter().find(|delimiter| header.contains(delimiter)).unwrap_or(&b',')
 }
 
-/// What bytes look like that are not CSV text.
+/// Describes bytes that are not CSV text.
 fn not_text(text: &[u8]) -> Option<&'static str> {
     if text.starts_with(b"\xff\xfe") || text.starts_with(b"\xfe\xff") {
         Some("it is UTF-16 text")

@@ -5,15 +5,25 @@ use std::io::{self, Write};
 
 use super::Log;
 
-/// Line end of the last row of a log that flqr computed; all others end in LF. Readers of CSV take either, and nothing else
-/// writes both, so that such a log is told from a measured one of the same columns.
+/// Line end of the last row of a log that flqr computed; all others end in LF. Readers of CSV take either, and
+/// nothing else writes both, so that such a log is distinguished from a measured one of the same columns.
 const LAST_LINE_END: [u8; 2] = *b"\r\n";
 
 /// Writes a computed log as CSV, every number with the fewest digits that read back to the same number; an empty cell
 /// for NaN. [`super::read_log`] reads it back to the same columns, and [`is_written_log`] recognises it.
 ///
 /// # Errors
-/// What the writer reports.
+/// Errors of the writer.
+///
+/// ```
+/// use flqr_core::record::{Log, write_log};
+///
+/// let log = Log::from_columns("pairs.csv", [("speed_rad_s", vec![1.0]), ("torque_nm", vec![0.25])]);
+/// let mut text = Vec::new();
+/// write_log(&log, &mut text)?;
+/// assert_eq!(String::from_utf8(text)?.lines().next(), Some("speed_rad_s,torque_nm"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn write_log(log: &Log, mut writer: impl Write) -> io::Result<()> {
     let row = |row: usize| log.columns.iter().map(move |column| column.values[row]);
     let mut rows = LogWriter::new(&mut writer, log.columns.iter().map(|column| &*column.name))?;
@@ -26,7 +36,7 @@ pub fn write_log(log: &Log, mut writer: impl Write) -> io::Result<()> {
     end.finish()
 }
 
-/// Whether a file that begins and ends with these bytes was written by [`write_log`] and not changed since.
+/// Returns whether a file that begins and ends with these bytes was written by [`write_log`] and not changed since.
 pub fn is_written_log(opening: &[u8], ending: [u8; 2]) -> bool {
     let header = opening.split(|&byte| byte == b'\n').next().unwrap_or_default();
     ending == LAST_LINE_END && header.starts_with(b"time_s,") && !header.ends_with(b"\r")
@@ -42,7 +52,7 @@ impl<W: Write> LogWriter<W> {
     /// Writes the header.
     ///
     /// # Errors
-    /// What the writer reports.
+    /// Errors of the writer.
     pub fn new<'n>(writer: W, names: impl Iterator<Item = &'n str>) -> io::Result<Self> {
         let mut csv = csv::Writer::from_writer(writer);
         for name in names {
@@ -55,7 +65,7 @@ impl<W: Write> LogWriter<W> {
     /// Writes a row: one value for each name.
     ///
     /// # Errors
-    /// What the writer reports, and a number of values that differs from that of the names.
+    /// Errors of the writer, and a wrong number of values.
     pub fn push(&mut self, values: impl Iterator<Item = f64>) -> io::Result<()> {
         for value in values {
             self.cell.clear();
@@ -69,7 +79,7 @@ impl<W: Write> LogWriter<W> {
     /// Hands all to the writer.
     ///
     /// # Errors
-    /// What the writer reports.
+    /// Errors of the writer.
     pub fn finish(mut self) -> io::Result<()> {
         self.csv.flush()
     }

@@ -1,8 +1,9 @@
 //! The refined model as the plant: what the controller of before and the one made from the refined model do with it.
 //!
-//! An effect that a controller could cancel is offered to it only if the simulated loop stays as calm with it as without:
-//! with four plants, one seed each: as it is, with a payload, with a longer delay, and with a smaller effect. Otherwise the
-//! refined model carries it with `feedforward = false`: the simulator has it, the controller leaves it.
+//! An effect that a controller could cancel is offered to it only if the simulated loop stays as calm with it as
+//! without: with four plants, one seed each: as it is, with a payload, with a longer delay, and with a smaller
+//! effect. Otherwise the refined model carries it with `feedforward = false`: the simulator has it, the controller
+//! leaves it.
 
 use std::f64::consts::TAU;
 use std::num::NonZeroUsize;
@@ -12,10 +13,9 @@ use serde::Serialize;
 
 use super::error::RefineError;
 use super::{Watch, report};
-use crate::effects::{Effect, EffectKind, Feedforward, MachineKind, Role};
-use crate::model_file::{Model, Rig, RobotModel};
+use crate::effects::{EffectKind, Feedforward, Role};
+use crate::model::{Effect, MachineKind, Model, Rig, RobotModel, RobotParameters};
 use crate::parallel;
-use crate::robot::RobotParameters;
 use crate::simulate::{self, ControllerChoice, Experiment, Outcome, Run, Scenario, TimedPose};
 
 /// Runs of the simulated robot with the refined model as the plant: the controller of before and the one made from the
@@ -24,7 +24,7 @@ use crate::simulate::{self, ControllerChoice, Experiment, Outcome, Run, Scenario
 pub struct ClosedLoop {
     /// One for each scenario.
     pub scenarios: Vec<LoopPair>,
-    /// What becomes of each effect in the controller.
+    /// Use of each effect in the controller.
     pub feedforward: Vec<Fed>,
 }
 
@@ -39,7 +39,7 @@ pub struct LoopPair {
     pub after: LoopRun,
 }
 
-/// How a run went, from the truth of the simulation once it has stood up.
+/// Statistics of a run, from the true simulated state after the start.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct LoopRun {
     /// Displacement, m; about its target where it drives.
@@ -48,13 +48,13 @@ pub struct LoopRun {
     pub x_dot_m_s: Spread,
     /// Pitch, rad.
     pub pitch_rad: Spread,
-    /// A periodic motion that keeps itself up; none where the robot comes to rest, or only noise moves it.
+    /// A periodic motion that keeps itself up; `None` if the robot comes to rest, or only noise moves it.
     pub limit_cycle: Option<LimitCycle>,
-    /// Whether it fell.
+    /// True if it fell.
     pub fell: bool,
 }
 
-/// How far a quantity wanders.
+/// Spread of a quantity.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Spread {
     /// Mean.
@@ -74,15 +74,15 @@ pub struct LimitCycle {
     pub frequency_hz: f64,
 }
 
-/// What becomes of an effect in the controller.
+/// Use of an effect in the controller.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Fed {
     /// Id of the effect.
     #[serde(serialize_with = "id")]
     pub effect: &'static EffectKind,
-    /// Whether the controller cancels it.
+    /// True if the controller cancels it.
     pub used: bool,
-    /// Why, or why not.
+    /// Reason.
     pub reason: String,
 }
 
@@ -93,23 +93,23 @@ fn id<S: serde::Serializer>(kind: &&'static EffectKind, serializer: S) -> Result
 /// Length of a run and where its statistics begin, s.
 const SECONDS: f64 = 20.0;
 const FROM_S: f64 = 5.0;
-/// The same of the runs that check a feedforward.
+/// Duration of the runs that check a feedforward.
 const CHECK_SECONDS: f64 = 8.0;
 const CHECK_FROM_S: f64 = 2.0;
-/// Variations of those runs: payload as a share of the body, longer delay, s, and smaller effect.
+/// Variations of those runs: payload as a fraction of the body, longer delay, s, and smaller effect.
 const PAYLOAD: f64 = 0.1;
 const LATER_S: f64 = 0.002;
 const SMALLER: f64 = 0.85;
-/// Share of the power of the wheels' way that a limit cycle has about one frequency, and its least amplitude, m.
+/// Fraction of the power of the wheels' way that a limit cycle has about one frequency, and its least amplitude, m.
 const PERIODIC: f64 = 0.5;
 const LEAST_CYCLE_M: f64 = 5e-4;
-/// How many times more a loop may swing with a feedforward than without, and by how much in any case, m and rad/s.
+/// Largest allowed increase of oscillation by a feedforward: factor, and absolute values, m and rad/s.
 const CALM: f64 = 1.25;
 const STILL_M: f64 = 5e-4;
 const STILL_RAD_S: f64 = 0.05;
 
 /// Simulates the refined model under the controllers of before and after, and marks in it the effects that a controller
-/// must leave; all that it could cancel where no loop can be simulated. None where nothing was found.
+/// must leave; all that it could cancel where no loop can be simulated. `None` if nothing was found.
 pub(super) fn closed_loop(
     declared: &Model,
     refined: &mut Model,
@@ -253,7 +253,8 @@ fn wave(values: &[f64], waves: usize) -> f64 {
     2.0 * re.hypot(im) / values.len() as f64
 }
 
-/// What becomes of each added effect; those that are not offered are marked in the model. Without a seed none can be tried.
+/// Use of each added effect; those that are not offered are marked in the model. Without a seed none can be
+/// tried.
 fn offered(
     refined: &mut Model,
     kinds: &[&'static EffectKind],
@@ -263,7 +264,7 @@ fn offered(
 ) -> Result<Vec<Fed>, RefineError> {
     let effects = effects_of(refined);
     let able: Vec<usize> = added.iter().copied().filter(|&place| effects[place].is_fed_forward()).collect();
-    // One after the other, each beside those that have passed, so that none hides behind another.
+    // One after the other, each next to those that have passed, so that none hides behind another.
     let (mut verdicts, mut passed) = (Vec::new(), Vec::new());
     for (number, &place) in able.iter().enumerate() {
         report(watch, number as f64 / able.len() as f64)?;
@@ -286,9 +287,7 @@ fn offered(
             (Some(Ok(reason)), _) => (true, reason.clone()),
             (Some(Err(reason)), _) => (false, reason.clone()),
             (None, Feedforward::Never(reason)) => (false, reason.to_owned()),
-            (None, _) => {
-                (true, "put right in the declared numbers that the controller is made from".to_owned())
-            }
+            (None, _) => (true, "corrected in the declared parameters of the controller".to_owned()),
         };
         told.push(Fed { effect: kind, used, reason });
     }
@@ -298,11 +297,12 @@ fn offered(
     Ok(told)
 }
 
-/// Why nothing is offered where no loop runs.
+/// Reason without a simulated loop.
 const UNTRIED: &str =
-    "left out: no loop could be simulated with this model, so that nothing shows that it stays calm";
-/// Why a driven robot does without.
-const ARMED: &str = "a driven robot leaves it out, as its motors' angles count from where they were armed";
+    "left out: no closed loop could be simulated with this model to verify that it stays stable";
+/// Reason for a robot being driven.
+const ARMED: &str =
+    "not used when driving a robot, because its motor angles are relative to the position at arming";
 
 /// Marks effects that no controller may cancel.
 fn keep_from(model: &mut Model, places: &[usize]) {
@@ -317,7 +317,8 @@ fn keep_from(model: &mut Model, places: &[usize]) {
     }
 }
 
-/// Whether the loop stays as calm where one more of the effects is fed forward beside some, and how calm it is.
+/// Returns whether the loop stays as calm where one more of the effects is fed forward next to some, and how calm it
+/// is.
 fn trial(
     refined: &Model,
     able: &[usize],
@@ -341,7 +342,7 @@ fn trial(
     let (mut swing, mut worst) = ([0.0; 2], None);
     for (n, pair) in runs.chunks(2).enumerate() {
         let [Some(without), Some(with)] = pair else {
-            return Err("left out: its loop could not be simulated".to_owned());
+            return Err("left out: its closed loop could not be simulated".to_owned());
         };
         let Some(robot) = plants[n].1.robot() else { continue };
         let calm = |run: &Run| {
@@ -359,9 +360,9 @@ fn trial(
             let what = if falls {
                 "the simulated robot falls".to_owned()
             } else if cycles {
-                format!("the simulated loop swings by itself by {:.1} mm", 1e3 * cycle_with)
+                format!("the simulated loop has a limit cycle of {:.1} mm", 1e3 * cycle_with)
             } else {
-                format!("the motors' speed wanders by {speed_with:.2} in place of {speed_without:.2} rad/s")
+                format!("the motor speed varies by {speed_with:.2} instead of {speed_without:.2} rad/s")
             };
             worst = worst.or(Some(format!("left out: with it and {}, {what}", plants[n].0)));
         }
@@ -369,7 +370,7 @@ fn trial(
     match worst {
         Some(reason) => Err(reason),
         None => Ok(format!(
-            "cancelled by the controller; the simulated motors' speed wanders by {:.3} rad/s without and {:.3} with it",
+            "cancelled by the controller; the motor speed in simulation varies by {:.3} rad/s without and {:.3} rad/s with it",
             swing[0], swing[1]
         )),
     }
@@ -395,14 +396,14 @@ fn variations(refined: &Model, fed: usize) -> Vec<(&'static str, Model)> {
         }
     });
     vec![
-        ("the model as it is", refined.clone()),
-        ("a payload of a tenth of the body", payload),
-        ("a delay that is 2 ms longer", later),
-        ("an effect that is 15 % smaller", smaller),
+        ("the nominal model", refined.clone()),
+        ("a payload of 10 % of the body mass", payload),
+        ("2 ms of additional delay", later),
+        ("a 15 % smaller effect", smaller),
     ]
 }
 
-/// The same effect of another size.
+/// Returns the effect with another size.
 fn scaled(effect: &Effect, share: f64) -> Option<Effect> {
     let own = effect.kind().parameters;
     let sized = effect.parameters().iter().enumerate().map(|(n, (key, value))| {
@@ -429,7 +430,7 @@ mod tests {
     #[test]
     fn a_swing_is_told_with_its_frequency_and_amplitude_and_noise_is_none() {
         let at = |tick: usize, x_m: f64| {
-            let state = crate::robot::State { x_m, ..Default::default() };
+            let state = crate::model::State { x_m, ..Default::default() };
             TimedPose { time_s: 0.01 * tick as f64, pose: Pose { state, ..Pose::default() } }
         };
         let p = presets::paper().robot().unwrap().parameters;
@@ -484,7 +485,7 @@ mod tests {
         assert_eq!(fed, [true, false, false]);
         assert!(found.scenarios.is_empty() && found.feedforward.len() == 3);
         assert!(found.feedforward.iter().all(|fed| !fed.used), "{found:?}");
-        assert!(found.feedforward[1].reason.contains("no loop could be simulated"), "{found:?}");
+        assert!(found.feedforward[1].reason.contains("no closed loop could be simulated"), "{found:?}");
         assert!(found.feedforward[2].reason.contains("lean"), "{found:?}");
         let text = refined.to_toml();
         assert_eq!(text.matches("feedforward = false").count(), 2);
@@ -497,7 +498,7 @@ mod tests {
         let declared = presets::paper();
         let mut refined = declared.clone();
         let Rig::Robot(robot) = &mut refined.rig else { unreachable!() };
-        let parameters = [("speed_rad_s", 1.0), ("level_nm", 0.3)];
+        let parameters = [("speed_rad_s", 1.0), ("amplitude_nm", 0.3)];
         robot.effects.push(Effect::new("low_speed_friction", MachineKind::Robot, None, parameters).unwrap());
         let found = watched(&declared, &mut refined, &["low_speed_friction"], 1);
         let fed = &found.feedforward[0];

@@ -7,43 +7,42 @@ use serde::Serialize;
 use super::error::RefineError;
 use super::verdict::Refinement;
 use super::{Options, refine};
-use crate::effects::{Effect, MachineKind};
-use crate::model_file::{Model, Rig, presets};
+use crate::model::{Effect, MachineKind, Model, Rig, RobotParameters};
+use crate::model_file::presets;
 use crate::record::Log;
 use crate::report::{Block, Cell, Column, Table};
-use crate::robot::RobotParameters;
 use crate::simulate::{self, ControllerChoice, Experiment, ExperimentError, Noise, Scenario};
 
 /// Length of each record, s.
 const SECONDS: f64 = 30.0;
-/// How far the hidden robot's numbers are off the declared ones, as one standard deviation.
+/// Standard deviation of the hidden robot's parameter errors.
 const MASS_OFF: f64 = 0.005;
 const LENGTH_OFF: f64 = 0.0025;
 const INERTIA_OFF: f64 = 0.0125;
 
-/// What a demonstration showed.
+/// Result of a demonstration.
 #[derive(Clone, Debug, Serialize)]
 pub struct Demonstration {
-    /// What was found from the records alone.
+    /// Effects identified from the recorded data.
     #[serde(flatten)]
     pub found: Refinement,
-    /// What the robot had in truth; nothing that looked for it was told.
+    /// True effect, unknown to the search.
     pub truth: Truth,
-    /// What was recorded.
+    /// Recorded data.
     #[serde(skip)]
     pub logs: Vec<Log>,
 }
 
-/// What a demonstration's robot has and its model lacks.
+/// Hidden effect of a demonstration.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Truth {
     /// The effect, as in a model file.
     pub effect: Effect,
-    /// Whether it is among the effects that were found, or among those that were not told from one of them.
+    /// True if it is among the effects that were found, or among those that were not distinguished from one of them.
     pub named: bool,
 }
 
-/// Why there is no demonstration.
+/// Reason why there is no demonstration.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum DemonstrationError {
     /// A run that could not be recorded.
@@ -62,9 +61,9 @@ const HIDDEN: [(&str, &[(&str, f64)]); 4] = [
     ("torque_gain", &[("gain", -0.12)]),
 ];
 
-/// Records a robot that has something its model lacks, and closes the loop with the records: the paper's robot, its numbers
-/// off within their tolerances, driven out and back and shaken under the declared model's controller. `seed` chooses what is
-/// hidden and draws all noise. `watch` is told the share of the work that is done.
+/// Records a robot that has something its model lacks, and closes the loop with the records: the paper's robot, its
+/// numbers off within their tolerances, driven out and back and shaken under the declared model's controller. `seed`
+/// chooses what is hidden and draws all noise. `watch` is told the fraction of the work that is done.
 ///
 /// # Errors
 /// The watcher ended it.
@@ -80,8 +79,8 @@ pub fn demonstrate(
             Experiment { seconds: SECONDS, seed, ..Experiment::new(scenario, ControllerChoice::Flqr) };
         let mut part = |share: f64| watch(0.1 * (number as f64 + share));
         let outcome = simulate::run(&experiment, &declared, &actual, &mut part)?;
-        let mut log = outcome.log(crate::robot::Motor::Left);
-        log.source = format!("record of the scenario {scenario}");
+        let mut log = outcome.log(crate::model::Motor::Left);
+        log.source = format!("recording of the scenario {scenario}");
         logs.push(log);
     }
     let options = Options { seed, ..Options::default() };
@@ -137,7 +136,7 @@ fn tell(truth: &Truth, found: &mut Refinement) {
         ]
     };
     let table = Table {
-        caption: "What the simulated robot had, and what was found".to_owned(),
+        caption: "Hidden effect and identified effects".to_owned(),
         columns: vec![
             Column::new("Effect", ""),
             Column::new("Parameter", ""),
@@ -149,9 +148,9 @@ fn tell(truth: &Truth, found: &mut Refinement) {
         rows: truth.effect.parameters().iter().map(row).collect(),
         note: String::new(),
     };
-    found.document.blocks.push(Block::section("The truth of this demonstration"));
+    found.document.blocks.push(Block::section("Hidden effect of this demonstration"));
     found.document.blocks.push(Block::paragraph(
-        "The robot was simulated with an effect that its model does not have. Nothing in the search was told of it.",
+        "The robot was simulated with an effect that its model does not have. The identification uses the recorded data only.",
     ));
     found.document.blocks.push(Block::Table(table));
 }

@@ -2,20 +2,20 @@
 
 use std::f64::consts::TAU;
 
-use crate::identify::quantile::student_t_975;
+use crate::signal::quantile::student_t_975;
 
 /// The main channel of a log over everything that it may depend on.
 ///
 /// Residuals are what was measured less what the model asks for at that row.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Explorer {
-    /// What the channel is: `torque`, `force` or `combined`.
+    /// Name of the channel: `torque`, `force` or `combined`.
     pub channel: &'static str,
     /// Everything that the residual may depend on, time first.
     pub variables: Vec<Variable>,
     /// Rows that took no part in the estimates.
     pub held_out: Vec<bool>,
-    /// What was measured, in `unit`.
+    /// Measured signal, in `unit`.
     pub measured: Vec<f64>,
     /// Residual of the declared model, in `unit`.
     pub before: Vec<f64>,
@@ -78,8 +78,8 @@ impl Explorer {
     }
 }
 
-/// 95 % interval of the root mean square of a residual on the held-out rows, by blocks of these; none where they are too
-/// few.
+/// 95 % interval of the root mean square of a residual on the held-out rows, by blocks of these; `None` if they are
+/// too few.
 pub(super) fn interval(residual: &[f64], held_out: &[bool]) -> Option<[f64; 2]> {
     let held = residual.iter().zip(held_out).filter(|(_, held)| **held).map(|(value, _)| value * value);
     let squares: Vec<f64> = held.collect();

@@ -16,13 +16,13 @@ const SEED: u64 = 95;
 pub(super) struct Gain {
     /// On all held-out rows.
     pub(super) share: f64,
-    /// 95 % interval by drawing blocks of these rows anew, as an effect may act in a few places alone; none where they
+    /// 95 % interval by drawing blocks of these rows anew, as an effect may act in a few places alone; `None` if they
     /// are too few.
     pub(super) ci95: Option<[f64; 2]>,
 }
 
 impl Gain {
-    /// Of residuals without and with the effect, on the held-out rows; none where there are none.
+    /// Of residuals without and with the effect, on the held-out rows; `None` if there are none.
     pub(super) fn new(without: &[f64], with: &[f64], held_out: &[bool]) -> Option<Self> {
         let held = without.iter().zip(with).zip(held_out).filter(|(_, held)| **held);
         let squares: Vec<[f64; 2]> = held.map(|((a, b), _)| [a * a, b * b]).collect();

@@ -1,8 +1,8 @@
-//! What the largest of many gains reaches by chance.
+//! Null distribution of the largest of many gains.
 
 use std::f64::consts::PI;
 
-/// The value that a share `level` of largest values exceeds, by Gumbel's distribution with their mean and standard
+/// The value that a fraction `level` of largest values exceeds, by Gumbel's distribution with their mean and standard
 /// deviation; its scale is at least `least_scale`. 0 of fewer than three values, in the unit of the values otherwise.
 pub(super) fn exceeded_by(values: &[f64], level: f64, least_scale: f64) -> f64 {
     const EULER: f64 = 0.577_215_664_901_532_9;

@@ -1,8 +1,7 @@
 //! The refined model without some of what was found.
 
-use crate::effects::{Declared, Effect, MachineKind, Role};
-use crate::model_file::{AxisParameters, Model, Rig};
-use crate::robot::Motor;
+use crate::effects::{Declared, Role};
+use crate::model::{AxisParameters, Effect, MachineKind, Model, Motor, Rig};
 
 /// The refined model without an effect that was found: taken from its list, or, where its declared numbers hold it,
 /// taken from those. `motor` is the one that a bench log belongs to; none for logs of the whole machine.

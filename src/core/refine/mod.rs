@@ -37,24 +37,23 @@ pub mod whiten;
 
 use std::ops::ControlFlow;
 
-use crate::model_file::{AxisParameters, Model, Rig};
+use crate::model::{AxisParameters, Model, Motor, Rig};
 use crate::record::{HealthFinding, Log, LogKind, Severity};
-use crate::robot::Motor;
 
 pub use closed_loop::{ClosedLoop, Fed, LimitCycle, LoopPair, LoopRun, Spread};
 pub use demo::{Demonstration, DemonstrationError, Truth, demonstrate};
 pub use error::RefineError;
 pub use explorer::{Explorer, Variable};
 pub use left_out::without;
-use next_experiment::Asked;
+use next_experiment::Context;
 pub use next_experiment::NextExperiment;
 use prediction::{Rows, predictions};
 pub use verdict::{
-    Carried, Channels, Corrected, Errors, Fate, Found, Prediction, Quantity, Refinement, Residual, Sized,
-    Test, Tried, Unexplained, Verdict,
+    Channels, Corrected, Errors, Found, Outcome, Prediction, Quantity, Refinement, Residual, ScoredCandidate,
+    Sized, Test, Transfer, Unexplained, Verdict,
 };
 
-/// How a model is refined.
+/// Options of a refinement.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
     /// Motor of a robot's model that a bench log belongs to.
@@ -70,22 +69,22 @@ pub struct Options {
     pub model_file: String,
 }
 
-/// Share of the work that the search is; the rest is the closed loop, predictions and the next experiment.
+/// Fraction of the work that the search is; the rest is the closed loop, predictions and the next experiment.
 const SEARCH: f64 = 0.75;
 
-/// Told the share of the work that is done; may end it.
+/// Told the fraction of the work that is done; may end it.
 type Watch<'a> = &'a mut dyn FnMut(f64) -> ControlFlow<()>;
 
 fn report(watch: Watch<'_>, share: f64) -> Result<(), RefineError> {
     if watch(share).is_break() { Err(RefineError::Cancelled) } else { Ok(()) }
 }
 
-/// Whether logs cannot answer.
+/// Returns whether logs cannot answer.
 fn is_unfit(findings: &[HealthFinding]) -> bool {
     findings.iter().any(|finding| finding.severity == Severity::Error)
 }
 
-/// How far a model is from logs of its machine.
+/// Computes the residual of a model on logs of its machine.
 ///
 /// # Errors
 /// No log, logs of several kinds, a log of another machine or without its columns.
@@ -111,7 +110,7 @@ pub fn residual(
 /// Finds what a model lacks, and adds it. Without `held_out` logs the last third of each log is held out, after a gap
 /// of 0.5 s.
 ///
-/// `watch` is told the share of the work that is done.
+/// `watch` is told the fraction of the work that is done.
 ///
 /// # Errors
 /// No log, logs of several kinds, a log of another machine or without its columns, a name in `estimate` that is no
@@ -146,8 +145,8 @@ pub fn refine(
         found.after.prediction =
             if found.model == *model { found.before.prediction.clone() } else { predicted(&found.model) };
         report(watch, SEARCH + 0.2)?;
-        let asked = Asked { logs, motor: options.motor, seed: options.seed, file: &options.model_file };
-        found.next_experiment = next_experiment::next_experiment(&found, &asked);
+        let context = Context { logs, motor: options.motor, seed: options.seed, file: &options.model_file };
+        found.next_experiment = next_experiment::next_experiment(&found, &context);
     }
     let (explorer, held) = (&found.explorer, &found.explorer.held_out);
     for (errors, residual) in [(&mut found.before, &explorer.before), (&mut found.after, &explorer.after)] {
@@ -168,7 +167,7 @@ fn check_speeds(options: &Options, kind: LogKind) -> Result<(), RefineError> {
     }
 }
 
-/// What all of the logs hold, as far as the model describes it: a log may serve several kinds.
+/// Returns the common kind of the logs that the model describes: a log may serve several kinds.
 fn kind_of(model: &Model, logs: &[Log]) -> Result<LogKind, RefineError> {
     let first = logs.first().ok_or(RefineError::NoLogs)?;
     let (kinds, wanted): (&[LogKind], _) = match &model.rig {

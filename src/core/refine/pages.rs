@@ -6,7 +6,7 @@ use crate::report::{Block, Cell, Column, Document, Table, Tone, capitalised};
 
 use super::closed_loop::{ClosedLoop, LoopRun};
 use super::pictures;
-use super::verdict::{Errors, Fate, Found, Prediction, Quantity, Refinement, Verdict};
+use super::verdict::{Errors, Found, Outcome, Prediction, Quantity, Refinement, Verdict};
 
 /// Most rows of what was tried.
 const MOST_TRIED: usize = 16;
@@ -35,13 +35,13 @@ pub(super) fn document(found: &Refinement, logs: &[Log], held_out: &[Log]) -> Do
         }
         remains(found, &mut blocks);
         if !found.parameters.is_empty() {
-            blocks.push(Block::section("Declared numbers as this log has them"));
+            blocks.push(Block::section("Declared parameters estimated from this log"));
             blocks.push(Block::Table(parameters(found)));
         }
     }
     let summary = format!(
-        "What the logs say about the model {}: its residual, the effects that it lacks, and the error on rows that took no \
-         part in the estimates.",
+        "Refinement of the model {}: its residual, the effects that it lacks, and the error \
+         on held-out rows.",
         found.model.name
     );
     Document { title: format!("{} refined", found.model.name), summary, blocks }
@@ -64,15 +64,17 @@ fn verdict(found: &Refinement) -> Block {
             "Unexplained residual",
             "the model lacks something that no effect of the library explains",
         ),
-        Verdict::DataUnfit => {
-            Block::notice(Tone::Warning, "Data unfit", "the logs cannot answer; the reasons stand below")
-        }
+        Verdict::DataUnfit => Block::notice(
+            Tone::Warning,
+            "Log not suitable for identification",
+            "the logs are not suitable for identification, for the reasons below",
+        ),
     }
 }
 
 fn said(found: &Found) -> String {
     format!(
-        "{} ({}), error lower by {:.1} %",
+        "{} ({}), error reduced by {:.1} %",
         found.effect.id(),
         found.effect.kind().summary,
         found.error_drop_percent
@@ -80,13 +82,13 @@ fn said(found: &Found) -> String {
 }
 
 fn health(found: &Refinement, [logs, held_out]: [&[Log]; 2], blocks: &mut Vec<Block>) {
-    blocks.push(Block::section("Health of the data"));
+    blocks.push(Block::section("Data health"));
     let items = logs.iter().map(|log| log.source.clone());
     let items = items.chain(held_out.iter().map(|log| format!("{}, held out", log.source))).collect();
     blocks.push(Block::List { numbered: false, items });
     let mut told: Vec<(&str, Vec<&str>)> = Vec::new();
     for finding in &found.data_health {
-        let text = format!("{}: {}; {}", finding.column, finding.problem, finding.mend);
+        let text = format!("{}: {}; {}", finding.column, finding.problem, finding.remedy);
         match finding.severity {
             Severity::Info => {
                 let place =
@@ -105,7 +107,7 @@ fn health(found: &Refinement, [logs, held_out]: [&[Log]; 2], blocks: &mut Vec<Bl
     if !told.is_empty() {
         blocks.push(Block::Table(Table {
             caption: "Rates, steps and held samples".to_owned(),
-            columns: vec![Column::new("Column", ""), Column::new("What it is like", "")],
+            columns: vec![Column::new("Column", ""), Column::new("Characteristics", "")],
             rows: told
                 .iter()
                 .map(|(column, problems)| vec![Cell::text(*column), Cell::text(problems.join("; "))])
@@ -115,11 +117,11 @@ fn health(found: &Refinement, [logs, held_out]: [&[Log]; 2], blocks: &mut Vec<Bl
     }
 }
 
-/// What was found with its pictures, and what was tried beside it.
+/// Report sections on effects and candidates.
 fn evidence(found: &Refinement, blocks: &mut Vec<Block>) {
     blocks.push(Block::section("Evidence"));
     if found.effects.is_empty() {
-        blocks.push(Block::paragraph("No effect of the library is named."));
+        blocks.push(Block::paragraph("No effect of the library was identified."));
     }
     for effect in &found.effects {
         let kind = effect.effect.kind();
@@ -128,10 +130,10 @@ fn evidence(found: &Refinement, blocks: &mut Vec<Block>) {
         let rivals = if others.is_empty() {
             String::new()
         } else {
-            format!(" This log cannot tell it from {}.", others.join(", "))
+            format!(" This log cannot distinguish it from {}.", others.join(", "))
         };
         blocks.push(Block::paragraph(format!(
-            "{}. With it the error on held-out rows is lower by {:.1} % than with all else alone.{rivals} What shows it best: {}.",
+            "{}. It reduces the error on held-out rows by {:.1} % compared with all other effects.{rivals} Best shown by: {}.",
             capitalised(kind.summary),
             effect.error_drop_percent,
             kind.separated_by
@@ -144,29 +146,29 @@ fn evidence(found: &Refinement, blocks: &mut Vec<Block>) {
 }
 
 fn tried(found: &Refinement) -> Table {
-    let row = |tried: &super::Tried| {
-        let added = tried.fate == Fate::Added;
+    let row = |tried: &super::ScoredCandidate| {
+        let added = tried.outcome == Outcome::Added;
         vec![
             Cell::text(format!("{} {}", tried.kind.id, tried.detail).trim().to_owned()),
             number(tried.gain_percent),
             number(tried.z),
-            Cell::text(if added { "added".to_owned() } else { tried.fate.to_string() }),
+            Cell::text(if added { "added".to_owned() } else { tried.outcome.to_string() }),
         ]
     };
     let left_out = found.candidates.len().saturating_sub(MOST_TRIED);
     let more =
-        if left_out > 0 { format!("{left_out} more were tried and gain less. ") } else { String::new() };
+        if left_out > 0 { format!("{left_out} more candidates with smaller gains.") } else { String::new() };
     Table {
-        caption: "What was tried".to_owned(),
+        caption: "Candidates".to_owned(),
         columns: vec![
             Column::new("Effect", ""),
-            Column::new("Error lower by, alone", "%"),
-            Column::new("Size by its standard error", ""),
-            Column::new("What became of it", ""),
+            Column::new("Error reduction, alone", "%"),
+            Column::new("Size / standard error", ""),
+            Column::new("Outcome", ""),
         ],
         rows: found.candidates.iter().take(MOST_TRIED).map(row).collect(),
         note: format!(
-            "{more}Errors on left-out blocks of the fitted rows, each effect alone beside the declared model."
+            "{more}Errors on left-out blocks of the fitted rows, with each effect alone added to the declared model."
         ),
     }
 }
@@ -204,7 +206,7 @@ fn effects(found: &Refinement) -> Table {
         }
     }
     Table {
-        caption: "Effects in order of evidence".to_owned(),
+        caption: "Effects in order of significance".to_owned(),
         columns: vec![
             Column::new("Effect", ""),
             Column::new("Parameter", ""),
@@ -212,8 +214,8 @@ fn effects(found: &Refinement) -> Table {
             Column::grouped("95 % interval", "from", ""),
             Column::grouped("95 % interval", "to", ""),
             Column::new("Unit", ""),
-            Column::new("Error lower by", "%"),
-            Column::new("Not told from", ""),
+            Column::new("Error reduction", "%"),
+            Column::new("Ambiguous with", ""),
         ],
         rows,
         note: String::new(),
@@ -234,7 +236,7 @@ fn errors(found: &Refinement) -> Table {
         }
     };
     add("Residual", |errors| &errors.rmse);
-    add("Residual by the torque or force itself", |errors| &errors.nrmse);
+    add("Residual relative to the torque or force", |errors| &errors.nrmse);
     add("Noise floor of the residual", |errors| &errors.noise_floor);
     Table {
         caption: "Root mean squares on held-out rows".to_owned(),
@@ -250,7 +252,7 @@ fn errors(found: &Refinement) -> Table {
         ],
         rows,
         note: "The same rows and filters before and after; before: the declared model, its parameters estimated within \
-               their tolerances. Intervals of 95 % by blocks of the held-out rows."
+               their tolerances. 95 % intervals from blocks of the held-out rows."
             .to_owned(),
     }
 }
@@ -258,7 +260,7 @@ fn errors(found: &Refinement) -> Table {
 fn predictions(found: &Refinement) -> Table {
     let row = |(before, after): (&Prediction, &Prediction)| {
         let cell = |quantity: &Quantity| number(quantity.value);
-        let error = |own: &Prediction| if own.told { cell(&own.rmse) } else { Cell::text("—") };
+        let error = |own: &Prediction| if own.informative { cell(&own.rmse) } else { Cell::text("—") };
         vec![
             Cell::text(before.variable),
             Cell::Number(format!("{:.0}", 1e3 * before.horizon_s)),
@@ -270,7 +272,7 @@ fn predictions(found: &Refinement) -> Table {
         ]
     };
     Table {
-        caption: "Short predictions from the log's own states under its torques".to_owned(),
+        caption: "Short predictions from the log's states and torques".to_owned(),
         columns: vec![
             Column::new("Of", ""),
             Column::new("Ahead", "ms"),
@@ -281,16 +283,15 @@ fn predictions(found: &Refinement) -> Table {
             Column::new("Unit", ""),
         ],
         rows: found.before.prediction.iter().zip(&found.after.prediction).map(row).collect(),
-        note: "Root mean squares over held-out starts. Noise alone: what the scatter of the readings at the start and the end \
-               makes of it. A robot that balances is unstable, so that its noise grows with the horizon; where that alone is \
-               more than the motion, the error tells nothing and a dash stands in its place."
+        note: "RMS over held-out initial states. Noise alone: error caused by measurement \
+               noise at the start and the end. A balancing robot is unstable, so this noise grows with the horizon; a dash marks errors where it exceeds the motion."
             .to_owned(),
     }
 }
 
 fn simulated(closed_loop: &ClosedLoop, blocks: &mut Vec<Block>) {
     let heading =
-        if closed_loop.scenarios.is_empty() { "In the controller" } else { "The closed loop, simulated" };
+        if closed_loop.scenarios.is_empty() { "In the controller" } else { "Simulated closed loop" };
     blocks.push(Block::section(heading));
     let mut rows = Vec::new();
     for pair in &closed_loop.scenarios {
@@ -325,8 +326,7 @@ fn simulated(closed_loop: &ClosedLoop, blocks: &mut Vec<Block>) {
     }
     if !rows.is_empty() {
         blocks.push(Block::Table(Table {
-            caption: "The refined model under the controller of the declared and of the refined model"
-                .to_owned(),
+            caption: "Refined model with the controllers of the declared and of the refined model".to_owned(),
             columns: vec![
                 Column::new("Scenario", ""),
                 Column::new("Measure", ""),
@@ -349,13 +349,13 @@ fn remains(found: &Refinement, blocks: &mut Vec<Block>) {
     blocks.push(Block::section("What remains"));
     if found.unexplained.description.is_empty() {
         blocks.push(Block::paragraph(
-            "Nothing that the tests of this program could tell from noise. That is no proof that nothing is left.",
+            "Nothing significant at the level of the noise. This does not prove that no error remains.",
         ));
     } else {
         blocks.push(Block::notice(Tone::Warning, "Unexplained", found.unexplained.description.clone()));
     }
     let Some(next) = &found.next_experiment else { return };
-    blocks.push(Block::part("What to record next"));
+    blocks.push(Block::part("Next experiment"));
     blocks.push(Block::paragraph(capitalised(&next.summary)));
     if let Some(command) = &next.command {
         blocks.push(Block::paragraph(format!("On the simulated robot: {command}")));
@@ -377,8 +377,8 @@ fn parameters(found: &Refinement) -> Table {
             Column::grouped("95 % interval", "to", ""),
         ],
         rows: found.parameters.iter().map(row).collect(),
-        note: "A free number that this log does not tell from the declared one stays as declared; its interval is what the \
-               log alone says."
+        note: "A free parameter that does not differ significantly from its declared value keeps it; the interval \
+               is from the log alone."
             .to_owned(),
     }
 }

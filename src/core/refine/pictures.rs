@@ -29,7 +29,7 @@ pub(super) fn in_time(explorer: &Explorer) -> Option<Chart> {
     panel.limits = noise(explorer);
     Some(Chart {
         title: "Residual in time, on held-out rows".to_owned(),
-        description: "What was measured less what the model asks for, before and after.".to_owned(),
+        description: "Measured minus modelled, before and after.".to_owned(),
         x: Axis::new("Time", "s"),
         panels: vec![panel],
     })
@@ -66,8 +66,7 @@ pub(super) fn over(explorer: &Explorer, variable: &Variable) -> Chart {
     }
     Chart {
         title: format!("Residual over {}", in_words(variable)),
-        description: "Means of the residual in bins of equally many held-out rows, with bands of 95 %."
-            .to_owned(),
+        description: "Mean residual in bins of equal numbers of held-out rows, with 95 % bands.".to_owned(),
         x: Axis::new(capitalised(in_words(variable).trim_start_matches("the ")), variable.unit),
         panels: vec![Panel::new(residual_axis(explorer), series)],
     }
@@ -76,14 +75,14 @@ pub(super) fn over(explorer: &Explorer, variable: &Variable) -> Chart {
 fn in_words(variable: &Variable) -> String {
     let name = match variable.name {
         "time_s" => "time",
-        "motor_angle_rad" => "the angle in a turn",
-        "motor_speed_rad_s" => "the motor's speed",
+        "motor_angle_rad" => "angle within a turn",
+        "motor_speed_rad_s" => "motor speed",
         "torque_nm" => "the torque",
         "force_n" => "the force",
         "x_m" => "the place",
-        "x_dot_m_s" => "the robot's speed",
+        "x_dot_m_s" => "robot speed",
         "pitch_rad" => "the pitch",
-        "pitch_rate_rad_s" => "the pitch rate",
+        "pitch_rate_rad_s" => "pitch rate",
         "position_m" => "the position",
         "velocity_m_s" => "the speed",
         other => other,
@@ -112,7 +111,7 @@ fn binned(over: &[f64], values: &[f64]) -> Vec<Bin> {
     pairs.chunks(size).filter(|rows| rows.len() >= LEAST_IN_BIN.min(pairs.len())).map(bin).collect()
 }
 
-/// Amplitudes over the orders of the motor angle; none where no order stands out.
+/// Amplitudes over the orders of the motor angle; `None` if no order stands out.
 pub(super) fn orders(explorer: &Explorer) -> Option<Chart> {
     if explorer.orders.len() < 4 {
         return None;
@@ -126,8 +125,7 @@ pub(super) fn orders(explorer: &Explorer) -> Option<Chart> {
     let shifted = |points: Vec<[f64; 2]>| points.into_iter().map(|[x, y]| [x + 0.3, y]);
     Some(Chart {
         title: "Orders of the motor angle".to_owned(),
-        description: "Amplitude of the residual at each whole number of waves in a turn, before and after."
-            .to_owned(),
+        description: "Amplitude of the residual at each harmonic of a turn, before and after.".to_owned(),
         x: Axis::new("Order", "1/turn"),
         panels: vec![Panel::new(
             Axis::new("Amplitude", explorer.unit),

@@ -14,12 +14,11 @@ pub(super) fn check(logs: &[&Log]) -> Vec<HealthFinding> {
     let finding = |log: &&Log| {
         let own = rate(log).filter(|own| (own / wanted - 1.0).abs() > SAME)?;
         let problem = format!(
-            "{} has {own:.1} rows a second and {} has {wanted:.1}: one filter serves all logs",
+            "{} has {own:.1} Hz and {} has {wanted:.1} Hz, but one filter is used for all logs",
             log.source, first.source
         );
-        let mend =
-            format!("record at one rate, or resample every log to {:.1} rows a second", own.min(wanted));
-        Some(HealthFinding::new(Severity::Error, "time_s", problem, mend))
+        let remedy = format!("record at one rate, or resample every log to {:.1} Hz", own.min(wanted));
+        Some(HealthFinding::new(Severity::Error, "time_s", problem, remedy))
     };
     logs.iter().filter_map(finding).collect()
 }

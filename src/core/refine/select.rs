@@ -1,4 +1,4 @@
-//! Which of many columns a target needs: least squares with bounded nuisances, judged by leaving out blocks.
+//! Which of many columns a target needs: least squares with bounded nuisances, assessed by leaving out blocks.
 //!
 //! Everything is computed from the Gram matrices of blocks of neighbouring rows, which one pass over the rows makes.
 //! A block is long against the memory of the residual, so that errors and intervals hold under coloured noise:
@@ -70,7 +70,7 @@ impl Judged {
         1.0 - self.error() / other.error()
     }
 
-    /// How many standard errors the gain over `other` is above 0, from its spread over the blocks.
+    /// Returns the gain over `other` in standard errors, from its spread over the blocks.
     pub fn gain_z(&self, other: &Self) -> f64 {
         let gains: Vec<f64> = other.held_out.iter().zip(&self.held_out).map(|(a, b)| a - b).collect();
         let count = gains.len() as f64;
@@ -162,7 +162,7 @@ impl Blocks {
         left(&self.total, members, coefficients)
     }
 
-    /// The fit, judged by leaving out one block after another; nothing where the members depend on each other, in all
+    /// The fit, assessed by leaving out one block after another; nothing where the members depend on each other, in all
     /// rows or without a block.
     pub fn judge(&self, members: &[Member], noise: f64) -> Option<Judged> {
         let small = self.of_members(members);
@@ -201,7 +201,7 @@ impl Blocks {
         }
     }
 
-    /// The same columns with another target.
+    /// Returns the same columns with another target.
     pub fn retargeted(&self, columns: &[&[f64]], target: &[f64], block: &[usize]) -> Self {
         let mut found = self.clone();
         let last = self.target();
@@ -220,8 +220,8 @@ impl Blocks {
         found
     }
 
-    /// Share of one combination of columns (what an effect does) that other columns can say instead, with the nuisances
-    /// taken out of both: the squared cosine.
+    /// Fraction of one combination of columns (what an effect does) that other columns can say instead, with the
+    /// nuisances taken out of both: the squared cosine.
     pub fn overlap(&self, nuisances: &[Member], noise: f64, one: &[(usize, f64)], other: &[usize]) -> f64 {
         let others: Vec<Member> =
             nuisances.iter().copied().chain(other.iter().map(|&column| Member::free(column))).collect();
@@ -408,7 +408,7 @@ mod tests {
         let mut blocks = Blocks::new(&[&noisy], &columns[0], &block);
         let attenuated = blocks.fit(&[Member::free(0)], 1.0).unwrap()[0];
         blocks.discount(0, 0, 1.0 / 12.0);
-        let mended = blocks.fit(&[Member::free(0)], 1.0).unwrap()[0];
-        assert!((attenuated - 0.5).abs() < 0.02 && (mended - 1.0).abs() < 0.05, "{attenuated} {mended}");
+        let fixed = blocks.fit(&[Member::free(0)], 1.0).unwrap()[0];
+        assert!((attenuated - 0.5).abs() < 0.02 && (fixed - 1.0).abs() < 0.05, "{attenuated} {fixed}");
     }
 }

@@ -1,9 +1,9 @@
-//! What closing the loop found.
+//! Results of a refinement.
 
 use serde::Serialize;
 
-use crate::effects::{Effect, EffectKind, MachineKind};
-use crate::model_file::Model;
+use crate::effects::EffectKind;
+use crate::model::{Effect, MachineKind, Model};
 use crate::record::{HealthFinding, Severity};
 use crate::report::Document;
 
@@ -11,7 +11,7 @@ use super::closed_loop::ClosedLoop;
 use super::explorer::Explorer;
 use super::next_experiment::NextExperiment;
 
-/// The answer in one word.
+/// Verdict of a refinement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
@@ -21,7 +21,7 @@ pub enum Verdict {
     EffectsFound,
     /// The model lacks something that no effect of the library explains.
     UnexplainedResidual,
-    /// The log cannot answer; `data_health` says why.
+    /// The log is not suitable for identification; see `data_health`.
     DataUnfit,
 }
 
@@ -32,7 +32,7 @@ pub struct Quantity {
     pub value: f64,
     /// As text.
     pub unit: &'static str,
-    /// 95 % interval, by blocks of the rows; none where there was no asking for it.
+    /// 95 % interval, by blocks of the rows; `None` if not requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ci95: Option<[f64; 2]>,
 }
@@ -61,10 +61,10 @@ impl Serialize for Channels {
     }
 }
 
-/// How far a model's motion runs away from the log's over a short time.
+/// Error of a short prediction of the model.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Prediction {
-    /// What is predicted, named as a log's column.
+    /// Predicted signal, named as a log column.
     pub variable: &'static str,
     /// Length of the prediction, s.
     pub horizon_s: f64,
@@ -72,20 +72,20 @@ pub struct Prediction {
     pub rmse: Quantity,
     /// Root mean square of the motion itself over that time.
     pub motion: Quantity,
-    /// What noise of the readings at the start and at the end makes of it.
+    /// Error due to measurement noise at the start and the end.
     pub noise_floor: Quantity,
-    /// Whether the error tells anything: a machine that is unstable by itself grows noise of the readings at the start
-    /// beyond the motion.
-    pub told: bool,
+    /// True if the error exceeds the amplified noise: an unstable machine amplifies measurement noise at the
+    /// start beyond the motion.
+    pub informative: bool,
 }
 
-/// How far a model is from a log.
+/// Errors of a model on a log.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Errors {
     /// Root mean square of the equation error.
     pub rmse: Channels,
-    /// Noise floor of the residual: from its own spectrum, of what is left where it is known, so that it is no lower with
-    /// worse rows. `residual` has that of the declared model on all rows, `refine` that of the refined one.
+    /// Noise floor of the residual: from its own spectrum, of what is left where it is known, so that it is no lower
+    /// with worse rows. `residual` has that of the declared model on all rows, `refine` that of the refined one.
     pub noise_floor: Channels,
     /// `rmse` by the root mean square of the torque or force itself.
     pub nrmse: Channels,
@@ -97,13 +97,13 @@ pub struct Errors {
 /// A diagnostic of a residual.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Test {
-    /// What was tested.
+    /// Name of the test.
     pub name: String,
     /// The statistic.
     pub value: f64,
     /// Above it, the residual has structure.
     pub threshold: f64,
-    /// Whether it has.
+    /// True if it has.
     pub structure: bool,
 }
 
@@ -113,9 +113,9 @@ pub struct Residual {
     /// The errors.
     #[serde(flatten)]
     pub errors: Errors,
-    /// What the residual depends on.
+    /// Dependence of the residual on variables.
     pub tests: Vec<Test>,
-    /// What is wrong with the logs.
+    /// Problems of the logs.
     pub data_health: Vec<HealthFinding>,
 }
 
@@ -139,11 +139,11 @@ pub struct Found {
     pub ci95: Vec<Option<[f64; 2]>>,
     /// Units of the parameters in their order.
     pub units: Vec<&'static str>,
-    /// By how much the error on held-out rows falls with it, in percent of the error without it.
+    /// Reduction of the error on held-out rows, in percent of the error without it.
     pub error_drop_percent: f64,
-    /// 95 % interval of that, by blocks of the held-out rows; none where it was not worked out.
+    /// 95 % interval of the reduction, from blocks of the held-out rows; `None` if not computed.
     pub error_drop_ci95: Option<[f64; 2]>,
-    /// Others that this log cannot tell from it.
+    /// Effects that this log cannot distinguish from it.
     pub ambiguous_with: Vec<&'static EffectKind>,
 }
 
@@ -181,74 +181,74 @@ impl Serialize for Parameters<'_> {
 /// Structure that no effect explains.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Unexplained {
-    /// What it depends on, the strongest first: `motor_angle_rad`, `motor_speed_rad_s`, `time_s` and so on.
+    /// Variables it depends on, the strongest first: `motor_angle_rad`, `motor_speed_rad_s`, `time_s` and so on.
     pub depends_on: Vec<String>,
-    /// Share of the whitened residual's power that each of them explains, in their order.
-    pub shares: Vec<f64>,
-    /// In words; empty where nothing is left.
+    /// Fraction of the whitened residual's power explained by each of them, in the same order.
+    pub fractions: Vec<f64>,
+    /// Description; empty without remaining structure.
     pub description: String,
 }
 
-/// What became of something that was tried.
+/// Outcome of a candidate.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Fate {
+pub enum Outcome {
     /// It is in the refined model.
     Added,
-    /// It does as well as what was added, and this log cannot tell them apart.
-    NotToldFrom(&'static EffectKind),
-    /// Nothing is left for it beside what was added.
+    /// It explains the log as well as an added effect and cannot be distinguished from it.
+    Ambiguous(&'static EffectKind),
+    /// Explained by the effects that were added.
     Explained,
-    /// It explains something, and too little for a name.
+    /// Its contribution is too small.
     TooSmall,
-    /// Its size is not surely other than 0.
-    NotSure,
-    /// The log does not excite it: declared numbers within their tolerances say nearly all that it would.
+    /// Its size is not significantly different from 0.
+    NotSignificant,
+    /// The log does not excite it: declared parameters within their tolerances explain nearly the same.
     NotTestable,
 }
 
-impl Fate {
-    /// One word for scripts.
+impl Outcome {
+    /// Returns its name for scripts.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Added => "added",
-            Self::NotToldFrom(_) => "not_told_from",
+            Self::Ambiguous(_) => "ambiguous",
             Self::Explained => "explained",
             Self::TooSmall => "too_small",
-            Self::NotSure => "not_sure",
+            Self::NotSignificant => "not_significant",
             Self::NotTestable => "not_testable",
         }
     }
 }
 
-impl std::fmt::Display for Fate {
+impl std::fmt::Display for Outcome {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Added => f.write_str("added"),
-            Self::NotToldFrom(kind) => write!(f, "not told from {}", kind.id),
-            Self::Explained => f.write_str("nothing left for it beside what was added"),
-            Self::TooSmall => f.write_str("explains too little"),
-            Self::NotSure => f.write_str("its size is not sure"),
-            Self::NotTestable => f.write_str("this log does not excite it"),
+            Self::Ambiguous(kind) => write!(f, "cannot be distinguished from {}", kind.id),
+            Self::Explained => f.write_str("explained by the effects that were added"),
+            Self::TooSmall => f.write_str("effect too small"),
+            Self::NotSignificant => f.write_str("not significant"),
+            Self::NotTestable => f.write_str("not excited by this log"),
         }
     }
 }
 
-/// One thing that was tried.
+/// Candidate effect with its score.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Tried {
+pub struct ScoredCandidate {
     /// The effect.
     pub kind: &'static EffectKind,
-    /// Its shape in words, as `order 14` or `5.0 ms`; may be empty.
+    /// Description of its shape, such as `order 14` or `5.0 ms`; may be empty.
     pub detail: String,
-    /// By how much the error on left-out blocks is lower with it alone beside the declared model, in percent.
+    /// Error reduction on left-out blocks with this effect alone, in percent.
     pub gain_percent: f64,
     /// Standard errors of its size above 0, by the jackknife over blocks.
     pub z: f64,
-    /// What became of it.
-    pub fate: Fate,
+    /// Outcome.
+    pub outcome: Outcome,
 }
 
-impl Tried {
+impl ScoredCandidate {
     /// Shape parameters in words: as many as are given, of a kind that comes as a series over and over.
     pub(super) fn detail_of(kind: &EffectKind, shape: &[f64], machine: MachineKind) -> String {
         let one = |(value, unit): (&f64, &str)| match unit {
@@ -261,41 +261,41 @@ impl Tried {
     }
 }
 
-impl Serialize for Tried {
+impl Serialize for ScoredCandidate {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         use serde::ser::SerializeMap;
         let mut map = serializer.serialize_map(None)?;
         map.serialize_entry("id", self.kind.id)?;
         map.serialize_entry("detail", &self.detail)?;
         map.serialize_entry("gain_percent", &self.gain_percent)?;
-        // A size that a single moment shows has no standard error.
+        // A size estimated from a single instant has no standard error.
         if self.z.is_finite() {
             map.serialize_entry("z", &self.z)?;
         }
-        map.serialize_entry("fate", self.fate.name())?;
-        if let Fate::NotToldFrom(kind) = self.fate {
-            map.serialize_entry("not_told_from", kind.id)?;
+        map.serialize_entry("outcome", self.outcome.name())?;
+        if let Outcome::Ambiguous(kind) = self.outcome {
+            map.serialize_entry("ambiguous_with", kind.id)?;
         }
         map.end()
     }
 }
 
-/// An effect that the model declares already, on these logs.
+/// Transfer check of a declared effect on new logs.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Carried {
+pub struct Transfer {
     /// Its id.
     pub id: &'static str,
-    /// By how much the error on held-out rows is lower with it, the declared numbers estimated anew with it and without,
-    /// in percent of the error without it.
+    /// By how much the error on held-out rows is lower with it, the declared numbers estimated anew with it and
+    /// without, in percent of the error without it.
     pub error_drop_percent: f64,
-    /// 95 % interval of that, by blocks of the held-out rows; none where these are too few.
+    /// 95 % interval of that, by blocks of the held-out rows; `None` if there are too few.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error_drop_ci95: Option<[f64; 2]>,
-    /// Where each log's angle counts from, by the effect, rad; fitted logs first.
-    pub zeros_rad: Vec<f64>,
+    /// Encoder offset of each log, estimated from the effect, rad; fitted logs first.
+    pub encoder_offsets_rad: Vec<f64>,
 }
 
-/// A declared number that was estimated along.
+/// Declared parameter that was estimated.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Corrected {
     /// Key as in the model file.
@@ -304,7 +304,7 @@ pub struct Corrected {
     pub declared: f64,
     /// As estimated.
     pub value: f64,
-    /// 95 % interval; none where the log is too short for one.
+    /// 95 % interval; `None` if the log is too short.
     pub ci95: Option<[f64; 2]>,
 }
 
@@ -313,27 +313,27 @@ pub struct Corrected {
 pub struct Refinement {
     /// The answer.
     pub verdict: Verdict,
-    /// What the model lacks, in order of evidence.
+    /// Missing effects, in order of significance.
     pub effects: Vec<Found>,
     /// Errors of the declared model on the held-out rows, its parameters estimated within their tolerances.
     pub before: Errors,
-    /// The same with the effects.
+    /// Errors with the effects.
     pub after: Errors,
-    /// What remains.
+    /// Remaining structure.
     pub unexplained: Unexplained,
-    /// What was tried, best first.
-    pub candidates: Vec<Tried>,
-    /// The refined model as the plant under the controllers of before and after, and what becomes of each effect; without
-    /// runs for an axis and a robot without weights, none where nothing was found.
+    /// Candidates, best first.
+    pub candidates: Vec<ScoredCandidate>,
+    /// The refined model as the plant under the controllers of before and after, and what becomes of each effect;
+    /// without runs for an axis and a robot without weights, `None` if nothing was found.
     pub closed_loop: Option<ClosedLoop>,
-    /// What to record next, where it would tell more.
+    /// Next experiment, where it would tell more.
     pub next_experiment: Option<NextExperiment>,
-    /// What is wrong with the logs.
+    /// Problems of the logs.
     pub data_health: Vec<HealthFinding>,
     /// Effects that the model declares already.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub carried: Vec<Carried>,
-    /// Declared numbers as this log has them.
+    pub transfer: Vec<Transfer>,
+    /// Declared parameters estimated from this log.
     pub parameters: Vec<Corrected>,
     /// The model with all of it.
     #[serde(skip)]
@@ -347,7 +347,7 @@ pub struct Refinement {
 }
 
 impl Refinement {
-    /// The answer where the logs cannot tell: what to do about the gravest finding is the next thing to do.
+    /// Creates the result for unsuitable logs: the next step is the remedy of the most severe finding.
     pub(super) fn unfit(model: &Model, data_health: Vec<HealthFinding>) -> Self {
         let worst = data_health.iter().find(|finding| finding.severity == Severity::Error);
         Self {
@@ -360,9 +360,9 @@ impl Refinement {
             closed_loop: None,
             next_experiment: worst
                 .or(data_health.first())
-                .map(|finding| NextExperiment::in_words(finding.mend.clone())),
+                .map(|finding| NextExperiment::in_words(finding.remedy.clone())),
             data_health,
-            carried: Vec::new(),
+            transfer: Vec::new(),
             parameters: Vec::new(),
             model: model.clone(),
             explorer: Explorer::default(),

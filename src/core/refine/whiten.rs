@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 
 /// Order of the filter.
 const ORDER: usize = 8;
-/// Share of white noise that is added, so that no part of the band is blown up.
+/// Fraction of white noise that is added, so that no part of the band is blown up.
 const FLOOR: f64 = 1e-3;
 /// Frequencies of the sums over the band.
 const STEPS: usize = 2000;

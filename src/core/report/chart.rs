@@ -1,11 +1,11 @@
-//! What a chart shows; [`super::svg`] decides how.
+//! Contents of a chart; [`super::svg`] decides how.
 
 /// Stacked panels over one horizontal axis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Chart {
     /// Short title, shown as the caption.
     pub title: String,
-    /// What there is to see, for readers who cannot see it and for the text report.
+    /// Alternative text, also used in the text report.
     pub description: String,
     /// The axis that all panels share.
     pub x: Axis,
@@ -13,7 +13,7 @@ pub struct Chart {
     pub panels: Vec<Panel>,
 }
 
-/// One plot with an axis of its own.
+/// One plot with a separate axis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Panel {
     /// The vertical axis.
@@ -39,7 +39,7 @@ pub struct Axis {
     pub range: Option<[f64; 2]>,
 }
 
-/// How values are laid out along an axis.
+/// Scale of an axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Scale {
     /// Equal differences are equally long.
@@ -54,13 +54,13 @@ pub enum Scale {
 pub struct Series {
     /// Name in the legend; series of one name have one colour in all panels.
     pub name: String,
-    /// How the points are joined.
+    /// Style of the points.
     pub mark: Mark,
     /// x and y; a value that is not finite is a gap.
     pub points: Vec<[f64; 2]>,
 }
 
-/// How the points of a series are drawn.
+/// Style of the points of a series.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mark {
     /// Joined by straight lines.
@@ -71,7 +71,7 @@ pub enum Mark {
     Step,
     /// Not joined.
     Scatter,
-    /// The outline of a tinted area, along one side and back along the other; goes without a name of its own in the
+    /// The outline of a tinted area, along one side and back along the other; goes without a separate name in the
     /// legend where a curve has the same.
     Area,
 }
@@ -92,7 +92,7 @@ pub struct Band {
 pub struct Limit {
     /// Name in the legend.
     pub name: String,
-    /// Where it is.
+    /// Position.
     pub y: f64,
 }
 

@@ -13,7 +13,7 @@ const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'";
 const NO_DIGIT: char = '\u{2007}';
 const NO_POINT: char = '\u{2008}';
 
-/// Whether a file that begins with these bytes was written by [`document`].
+/// Returns whether a file that begins with these bytes was written by [`document`].
 pub(super) fn is_opening(bytes: &[u8]) -> bool {
     let empty = document(&Document::default());
     let opening = empty.split("<title").next().unwrap_or_default();

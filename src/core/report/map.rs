@@ -1,4 +1,4 @@
-//! Where values lie along an axis.
+//! Mapping of values to an axis.
 
 use super::chart::{Axis, Scale};
 use super::ticks::{Tick, ticks};
@@ -14,7 +14,7 @@ pub(super) struct Map {
 }
 
 impl Map {
-    /// Shows `values`, or the axis' own range, on the pixels `to`. `margin` is the share of the length left free
+    /// Shows `values`, or the axis' own range, on the pixels `to`. `margin` is the fraction of the length left free
     /// at both ends of what the axis does not fix.
     pub(super) fn new(axis: &Axis, values: Option<[f64; 2]>, margin: f64, to: [f64; 2]) -> Self {
         let scale = axis.scale;

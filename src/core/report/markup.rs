@@ -2,7 +2,7 @@
 
 use std::fmt::Display;
 
-use super::looks::Looks;
+use super::inline_style::InlineStyle;
 
 /// An attribute of an element.
 pub(super) type Attribute<'a> = (&'a str, &'a dyn Display);
@@ -12,12 +12,12 @@ pub(super) type Attribute<'a> = (&'a str, &'a dyn Display);
 pub(super) struct Markup {
     out: String,
     /// Given to every element as attributes.
-    looks: Option<Looks>,
+    looks: Option<InlineStyle>,
 }
 
 impl Markup {
     /// Markup whose elements have their looks with them.
-    pub(super) fn with_looks(looks: Looks) -> Self {
+    pub(super) fn with_looks(looks: InlineStyle) -> Self {
         Self { out: String::new(), looks: Some(looks) }
     }
 

@@ -7,11 +7,12 @@
 
 mod chart;
 mod html;
-mod looks;
+mod inline_style;
 mod map;
 mod markup;
 pub mod number;
 mod path;
+mod phrases;
 mod svg;
 mod table;
 #[cfg(test)]
@@ -19,11 +20,10 @@ mod tests;
 mod text;
 mod thin;
 mod ticks;
-mod words;
 
 pub use chart::{Axis, Band, Chart, Limit, Mark, Panel, Scale, Series};
+pub use phrases::capitalised;
 pub use table::{Cell, Column, Table};
-pub use words::capitalised;
 
 /// A report.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -50,16 +50,16 @@ pub enum Block {
     Paragraph(String),
     /// A paragraph that stands out.
     Notice {
-        /// How it is meant.
+        /// Tone.
         tone: Tone,
-        /// What it begins with, in bold: the meaning must not hang on the tone's colour alone.
+        /// First words, in bold: the meaning must not hang on the tone's colour alone.
         label: String,
         /// Its words.
         text: String,
     },
     /// A list, numbered or not.
     List {
-        /// Whether the items have numbers.
+        /// True if the items have numbers.
         numbered: bool,
         /// One paragraph each.
         items: Vec<String>,
@@ -70,7 +70,7 @@ pub enum Block {
     Figure(Chart),
 }
 
-/// How a notice is meant.
+/// Tone of a notice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tone {
     /// Good to know.
@@ -109,7 +109,7 @@ impl Document {
         html::document(self)
     }
 
-    /// Whether a file that begins with these bytes was written by [`Document::to_html`].
+    /// Returns whether a file that begins with these bytes was written by [`Document::to_html`].
     pub fn is_opening_of_html(bytes: &[u8]) -> bool {
         html::is_opening(bytes)
     }
@@ -121,12 +121,12 @@ impl Document {
 }
 
 impl Chart {
-    /// The chart as a picture of its own on white, for any program that draws SVG.
+    /// The chart as a separate picture on white, for any program that draws SVG.
     pub fn to_svg(&self) -> String {
         svg::picture(self, [svg::WIDE, f64::NAN])
     }
 
-    /// The same of a given width and height, px: the height is that of the panels with their legend and axes, which
+    /// Creates it with a given width and height, px: the height is that of the panels with their legend and axes, which
     /// take what they need of it.
     pub fn to_svg_of(&self, size: [f64; 2]) -> String {
         svg::picture(self, size)

@@ -6,7 +6,7 @@
 use std::fmt;
 
 use super::chart::{Chart, Mark, Panel, Series, extent};
-use super::looks::Looks;
+use super::inline_style::InlineStyle;
 use super::map::{Map, along};
 use super::markup::{Attribute, Markup};
 use super::path::{Px, dots, polyline, stairs};
@@ -17,7 +17,7 @@ use super::ticks::Tick;
 pub(super) const WIDE: f64 = 880.0;
 /// Width for telephones, px.
 pub(super) const NARROW: f64 = 420.0;
-/// Looks of all charts; colours that people with any colour vision tell apart, on white and on dark.
+/// InlineStyle of all charts; colours that people with any colour vision distinguish, on white and on dark.
 pub(super) const STYLE: &str = include_str!("chart.css");
 
 /// Widths and heights of pictures, px.
@@ -39,9 +39,9 @@ const COLOURS: usize = 6;
 const DASHES: usize = 3;
 const TINTS: usize = 3;
 
-/// A file of its own, of a width and a height; NaN for the usual ones.
+/// A separate file, of a width and a height; NaN for the usual ones.
 pub(super) fn picture(chart: &Chart, [width, height]: [f64; 2]) -> String {
-    let mut markup = Markup::with_looks(Looks::of_sheet(STYLE));
+    let mut markup = Markup::with_looks(InlineStyle::of_sheet(STYLE));
     let width = if width.is_finite() { width.clamp(SMALLEST, LARGEST) } else { WIDE };
     let mut layout = Layout::new(chart, width - 2.0 * MARGIN);
     if height.is_finite() {
@@ -105,7 +105,7 @@ struct Layout {
     bands: Vec<String>,
 }
 
-/// Where a panel's axis title begins and its plot lies.
+/// Position of a panel's axis title and plot.
 struct Place {
     title_top: f64,
     title: Vec<String>,
@@ -276,7 +276,8 @@ impl Layout {
         }
         let plot_width = self.width - RIGHT - self.left;
         let frame = [Px(self.left), Px(place.top), Px(plot_width), Px(place.height)];
-        // Nothing is drawn beyond the frame. A picture within the picture would do it too, but not every program draws one.
+        // Nothing is drawn beyond the frame. A picture within the picture would do it too, but not every program
+        // draws one.
         let size: [(&str, &dyn fmt::Display); 4] =
             [("x", &frame[0]), ("y", &frame[1]), ("width", &frame[2]), ("height", &frame[3])];
         markup.element("clipPath", &[("id", &clip)], |markup| markup.leaf("rect", &size));

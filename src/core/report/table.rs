@@ -26,7 +26,7 @@ pub struct Column {
     pub group: String,
 }
 
-/// What stands in a table at one place.
+/// Table cell.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Cell {
     /// Words, aligned left.
@@ -78,14 +78,14 @@ impl Cell {
 }
 
 impl Table {
-    /// Whether a column holds numbers and nothing else.
+    /// Returns whether a column holds numbers and nothing else.
     pub(super) fn is_numeric(&self, column: usize) -> bool {
         let mut cells =
             self.rows.iter().filter_map(|row| row.get(column)).filter(|cell| **cell != Cell::Empty);
         cells.clone().next().is_some() && cells.all(|cell| matches!(cell, Cell::Number(_)))
     }
 
-    /// Groups of neighbouring columns as name and number of columns; none where no column has a group.
+    /// Groups of neighbouring columns as name and number of columns; `None` if no column has a group.
     pub(super) fn groups(&self) -> Vec<(&str, usize)> {
         let mut groups: Vec<(&str, usize)> = Vec::new();
         for column in &self.columns {

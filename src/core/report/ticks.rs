@@ -1,4 +1,4 @@
-//! Where the ticks of an axis are and how they read.
+//! Positions and labels of axis ticks.
 
 use super::chart::Scale;
 use super::number;

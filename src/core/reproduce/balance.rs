@@ -2,14 +2,14 @@
 
 use super::pages::Pages;
 use super::paper::{self, BalanceTable};
+use super::phrases::{listed, sig};
 use super::table::{Digits, Table};
 use super::trials::{Balanced, Runs};
-use super::words::{listed, sig};
-use crate::model_file::RobotModel;
+use crate::model::RobotModel;
 use crate::report::{Axis, Band, Chart, Mark, Panel, Series};
 use crate::simulate::{Statistics, Summary};
 
-/// What LQR's range and standard deviation may differ from the paper's by.
+/// Tolerated factor between LQR's range and standard deviation and the paper's.
 const LQR_TOLERANCE: f64 = 1.5;
 pub(super) const CONTROLLERS: [&str; 2] = ["LQR", "FLQR"];
 /// Name and unit of what is balanced.
@@ -22,9 +22,9 @@ pub(super) struct Ground {
     pub(super) table: usize,
     pub(super) figure: usize,
     pub(super) paper: BalanceTable,
-    /// What the robot does.
+    /// Motion of the robot.
     does: &'static str,
-    /// How long before the statistics the figure begins; all of the run where there is no drive to hide.
+    /// Start of the figure before the statistics; the whole run without a drive.
     shown_before_s: f64,
     findings: [&'static str; 2],
 }
@@ -35,7 +35,7 @@ pub(super) const FLAT: Ground = Ground {
     table: 5,
     figure: 8,
     paper: paper::TABLE_5,
-    does: "is let go nearly upright on flat ground and stands",
+    does: "is released nearly upright on flat ground and stands",
     shown_before_s: f64::INFINITY,
     findings: ["table_5_lqr", "table_5_factors"],
 };
@@ -45,7 +45,7 @@ pub(super) const BRIDGE: Ground = Ground {
     table: 6,
     figure: 10,
     paper: paper::TABLE_6,
-    does: "drives onto a bridge under one wheel and stands there; x is counted from where it is to stand",
+    does: "drives onto a bridge under one wheel and stands there; x is relative to the target position",
     shown_before_s: 5.0,
     findings: ["table_6_lqr", "table_6_factors"],
 };
@@ -64,7 +64,7 @@ pub(super) fn factors(lqr: &[Summary; 3], flqr: &[Summary; 3]) -> [f64; 3] {
     std::array::from_fn(|quantity| lqr[quantity].std / flqr[quantity].std)
 }
 
-/// The same of one of the paper's tables.
+/// Values of one of the paper's tables.
 pub(super) fn paper_factors(table: &BalanceTable) -> [f64; 3] {
     table.map(|[lqr, flqr]| lqr.std / flqr.std)
 }
@@ -78,21 +78,20 @@ pub(super) fn factors_over_seeds(runs: &Runs) -> Vec<[f64; 3]> {
         .collect()
 }
 
-/// Whether neither run of a seed, counted from 0, ended with a fall: figures of one that did judge nothing.
+/// Returns whether neither run of a seed, counted from 0, ended with a fall: figures of one that did assess nothing.
 pub(super) fn stood(runs: &Runs, seed: usize) -> bool {
     runs.iter().all(|controller| controller[seed].fell_at_s.is_none())
 }
 
-/// What both experiments have in common.
+/// Sections common to both experiments.
 pub(super) fn introduce(robot: &RobotModel, pages: &mut Pages) {
-    pages.section("How Tables 5 to 7 are read (section 4.4)");
+    pages.section("Interpretation of Tables 5 to 7 (section 4.4)");
     if let Some(compensation) = robot.compensation {
         pages.contradiction(
             8,
             format!(
-                "Eq. 28 has sign(q̇), which at rest is undefined and with a speed read in steps dithers; the paper does \
-                 not say what it feeds forward there. Here the direction is tanh(q̇ / {} rad/s) and the whole is \
-                 multiplied by {}; both are parameters of the model.",
+                "Eq. 28 has sign(q̇), which is undefined at standstill and chatters with a quantized speed; \
+                 the paper does not state the feedforward there. Here, the direction is tanh(q̇ / {} rad/s) and the feedforward is scaled by {}; both are parameters of the model.",
                 sig(compensation.smoothing_speed_rad_s),
                 sig(compensation.ratio),
             ),
@@ -106,8 +105,8 @@ pub(super) fn write(ground: &Ground, robot: &RobotModel, runs: &Runs, pages: &mu
     pages.section(ground.title);
     let first = [0, 1].map(|controller: usize| &runs[controller][0]);
     pages.paragraph(format!(
-        "The robot {}. Each run lasts {} s; statistics are those of what the robot measures, from {} s on. The paper does \
-         not say which part of its runs its tables cover.",
+        "The robot {}. Each run lasts {} s; the statistics are of the measured signals after {} s. The paper does \
+         not state which part of its runs the tables cover.",
         ground.does,
         sig(first[0].seconds),
         sig(first[0].statistics.from_s),
@@ -132,7 +131,7 @@ pub(super) fn falls(runs: &Runs, pages: &mut Pages) {
         for (number, run) in runs.iter().enumerate() {
             if let Some(time) = run.fell_at_s {
                 pages.warning(format!(
-                    "under {name} the robot fell at {} s in run {}: its numbers are those up to there",
+                    "with {name} the robot fell at {} s in run {}: its numbers are up to that time",
                     sig(time),
                     number + 1
                 ));
@@ -146,7 +145,7 @@ fn statistics_table(ground: &Ground, runs: [&Balanced; 2]) -> Table {
     let columns = [("least", ""), ("greatest", ""), ("mean", ""), ("std", "")];
     let mut table = Table::new(format!("table_{}", ground.table), title, &columns)
         .digits(Digits::Fixed(4))
-        .note("Std is the standard deviation, which the paper heads variance; its pitch is read as rad.");
+        .note("Std is the standard deviation, which the paper calls variance; its pitch is taken as rad.");
     for (quantity, (name, unit)) in QUANTITIES.into_iter().enumerate() {
         for (controller, label) in CONTROLLERS.into_iter().enumerate() {
             let all = |summary: Summary| [summary.min, summary.max, summary.mean, summary.std].map(Some);
@@ -162,7 +161,7 @@ fn statistics_table(ground: &Ground, runs: [&Balanced; 2]) -> Table {
 }
 
 fn factor_table(ground: &Ground, runs: [&Balanced; 2]) -> Table {
-    let title = format!("Table {}, LQR over FLQR", ground.table);
+    let title = format!("Table {}, ratio LQR / FLQR", ground.table);
     let columns = [("std", ""), ("range", "")];
     let mut table =
         Table::new(format!("table_{}_factors", ground.table), title, &columns).digits(Digits::Fixed(1));
@@ -177,16 +176,16 @@ fn factor_table(ground: &Ground, runs: [&Balanced; 2]) -> Table {
 
 fn seed_table(ground: &Ground, runs: &Runs) -> Table {
     let count = runs[0].len();
-    let title = format!("Table {} over {count} seeds of the noise", ground.table);
+    let title = format!("Table {} over {count} noise seeds", ground.table);
     let columns = [("least", ""), ("median", ""), ("greatest", "")];
     let mut table = Table::new(format!("table_{}_seeds", ground.table), title, &columns);
     for (quantity, (name, unit)) in QUANTITIES.into_iter().enumerate() {
         for (runs, label) in runs.iter().zip(CONTROLLERS) {
             let deviations = runs.iter().map(|run| summaries(&run.statistics)[quantity].std).collect();
-            table.push(format!("{name}, std under {label}, {unit}"), [], three(deviations));
+            table.push(format!("{name}, std with {label}, {unit}"), [], three(deviations));
         }
         let ratios = factors_over_seeds(runs).iter().map(|factors| factors[quantity]).collect();
-        table.push(format!("{name}, std LQR over FLQR"), [], three(ratios));
+        table.push(format!("{name}, std LQR / FLQR"), [], three(ratios));
     }
     table
 }
@@ -220,7 +219,7 @@ fn lqr_finding(ground: &Ground, runs: &Runs, ours: &[Summary; 3], pages: &mut Pa
             ground.on
         ),
         outside.is_empty() && stood(runs, 0),
-        format!("Ours over the paper's: {}.{rest}", listed(&told)),
+        format!("Simulation / paper: {}.{rest}", listed(&told)),
     );
 }
 
@@ -241,14 +240,14 @@ fn factor_finding(ground: &Ground, runs: &Runs, pages: &mut Pages) {
             } else {
                 String::new()
             };
-            format!("{name} {} for {}{over_seeds}", sig(ours[quantity]), sig(theirs[quantity]))
+            format!("{name} {} ({}){over_seeds}", sig(ours[quantity]), sig(theirs[quantity]))
         })
         .collect();
     pages.finding(
         ground.findings[1],
-        format!("FLQR's standard deviations on {} fall by at least the paper's own factors", ground.on),
+        format!("FLQR reduces the standard deviations on {} by at least the paper's factors", ground.on),
         (0..3).all(|quantity| ours[quantity] >= theirs[quantity]) && stood(runs, 0),
-        format!("Ours for the paper's: {}.", listed(&told)),
+        format!("Simulation (paper): {}.", listed(&told)),
     );
 }
 
@@ -260,7 +259,7 @@ fn pitch_over_x(robot: &RobotModel, frequency_rad_s: f64) -> f64 {
     (c.c1 + c.c5) * squared / (c.c4 + (c.c2 + c.c3) * squared)
 }
 
-/// What the spread of x and ẋ, taken as one oscillation, asks of the pitch.
+/// Pitch implied by the spread of x and ẋ as one oscillation.
 fn pitch_asked(robot: &RobotModel, summaries: &[Summary; 3]) -> f64 {
     pitch_over_x(robot, summaries[1].std / summaries[0].std) * summaries[0].std
 }
@@ -268,9 +267,8 @@ fn pitch_asked(robot: &RobotModel, summaries: &[Summary; 3]) -> f64 {
 fn oscillation(ground: &Ground, robot: &RobotModel, ours: &[Summary; 3]) -> String {
     let paper = ground.paper.map(|[lqr, _]| lqr);
     format!(
-        "How far the three quantities agree with each other: an oscillation with the paper's standard deviations of x and \
-         ẋ under LQR has {} rad/s and needs a pitch of {} rad (standard deviation, linear model of this robot); its table \
-         has {}. Ours has {} rad/s and needs {} rad; measured are {}.",
+        "Consistency of the three quantities: an oscillation with the paper's standard deviations of x and ẋ with \
+         LQR has {} rad/s and needs a pitch of {} rad (standard deviation, linear model of this robot); its table has {}. The simulation has {} rad/s and needs {} rad; measured: {}.",
         sig(paper[1].std / paper[0].std),
         sig(pitch_asked(robot, &paper)),
         sig(paper[2].std),
@@ -280,13 +278,13 @@ fn oscillation(ground: &Ground, robot: &RobotModel, ours: &[Summary; 3]) -> Stri
     )
 }
 
-/// What two decimals can tell.
+/// Resolution of two decimals.
 fn rounding(ground: &Ground) -> String {
     let [lqr, flqr] = &ground.paper[2];
     let step = 0.01;
     format!(
         "The paper prints the range of the pitch in steps of {} rad. FLQR's, {}, is {} of these steps, and its standard \
-         deviation, {}, is half a step or {}: its factor of {} in pitch can be no better known than that.",
+         deviation, {}, is half a step or {}: its factor of {} in pitch has that uncertainty.",
         sig(step),
         sig(width(flqr)),
         sig(libm::round(width(flqr) / step)),
@@ -318,12 +316,12 @@ fn pitch_unit(robot: &RobotModel) -> String {
         (text, off[0] < off[1])
     });
     let verdict = if told.iter().all(|(_, is_rad)| *is_rad) {
-        "The numbers are radians, and so they are read"
+        "The numbers are in radians"
     } else {
-        "For this robot that does not tell; they are read as radians"
+        "This is inconclusive for this robot; they are taken as radians"
     };
     let [(flat, _), (bridge, _)] = told;
-    format!("Tables 5 to 7 head the pitch in degrees. Under LQR, {flat}; {bridge}. {verdict}.")
+    format!("Tables 5 to 7 give the pitch in degrees. With LQR, {flat}; {bridge}. {verdict}.")
 }
 
 /// A value within [a, b] with mean m has a variance of at most (b − m)(m − a).
@@ -340,10 +338,10 @@ fn spread_name() -> String {
     let as_deviation = rows().filter(|row| row.std > largest_variance(row).sqrt()).count();
     let example = &FLAT.paper[0][0];
     format!(
-        "The last columns of Tables 5 and 6 are headed variance. A quantity that stays within its printed range about its \
+        "The last columns of Tables 5 and 6 are labelled variance. A quantity that stays within its printed range about its \
          printed mean cannot have a variance as large as the printed number in {as_variance} of {count} rows (x on flat \
-         ground under LQR: {} m² printed, {} m² possible), nor a standard deviation in {as_deviation}: they are standard \
-         deviations, and so they are read.",
+         ground under LQR: {} m² printed, {} m² possible), nor a standard deviation in {as_deviation}: they are taken \
+         as standard deviations.",
         sig(example.std),
         sig(largest_variance(example)),
     )
@@ -356,7 +354,7 @@ fn chart(ground: &Ground, runs: [&Balanced; 2]) -> Chart {
     Chart {
         title: format!("Figure {}: {}", ground.figure, ground.on),
         description: format!(
-            "x, ẋ and pitch as the robot measures them. LQR's x spans {} m in the statistics, FLQR's {} m.",
+            "Measured x, ẋ and pitch. The range of x in the statistics is {} m with LQR and {} m with FLQR.",
             sig(width(&runs[0].statistics.x_m)),
             sig(width(&runs[1].statistics.x_m)),
         ),
@@ -381,14 +379,14 @@ pub(super) fn panels(runs: [&Balanced; 2], shown_s: paper::Range, bands: &[Band]
         .collect()
 }
 
-/// What the abstract claims, judged by the paper's own figures and by ours.
+/// Claim of the abstract, compared with the paper's tables and the simulation.
 pub(super) fn abstracts_claim(flat: &Runs, bridge: &Runs, pages: &mut Pages) {
     pages.section("The abstract's claim");
     pages.paragraph(format!(
         "The paper concludes that the variances of x, ẋ and pitch fall by at least one order of magnitude, a factor of {}.",
         sig(paper::CLAIMED_FACTOR)
     ));
-    let title = "LQR over FLQR, as standard deviations and as variances (their squares)";
+    let title = "Ratio LQR / FLQR of standard deviations and of variances (their squares)";
     let mut table =
         Table::new("abstract_claim", title, &[("std", ""), ("variance", "")]).digits(Digits::Fixed(1));
     let mut all = [Vec::new(), Vec::new()];
@@ -417,7 +415,7 @@ pub(super) fn abstracts_claim(flat: &Runs, bridge: &Runs, pages: &mut Pages) {
     pages.contradiction(
         10,
         format!(
-            "The text claims a fall by at least {} for all; the paper's own columns fall by {}. {}.",
+            "The text claims a reduction by at least {} for all; the paper's columns fall by {}. {}.",
             sig(paper::CLAIMED_FACTOR),
             listed(&factors),
             told("As printed", theirs),
@@ -425,13 +423,13 @@ pub(super) fn abstracts_claim(flat: &Runs, bridge: &Runs, pages: &mut Pages) {
     );
     pages.finding(
         "abstract_claim_paper",
-        "By the paper's own figures all variances fall by at least one order of magnitude",
+        "In the paper's tables, all variances fall by at least one order of magnitude",
         theirs[1] == count,
         format!("{}.", told("The paper's", theirs)),
     );
     pages.finding(
         "abstract_claim_ours",
-        "By ours all variances fall by at least one order of magnitude",
+        "In the simulation, all variances fall by at least one order of magnitude",
         ours[1] == count && stood(flat, 0) && stood(bridge, 0),
         format!("{}.", told("Ours", ours)),
     );

@@ -1,17 +1,15 @@
-//! What is left under FLQR, and what it comes from.
+//! Residual motion with FLQR and its causes.
 
 use super::balance::{BRIDGE, FLAT, QUANTITIES, summaries};
 use super::pages::Pages;
+use super::phrases::{listed, sig};
 use super::table::{Digits, Table};
 use super::trials::Balanced;
-use super::words::{listed, sig};
 
 pub(super) fn write(causes: &[(&'static str, Balanced)], pages: &mut Pages) {
     let [(_, whole), rest @ ..] = causes else { return };
-    pages.section("What keeps FLQR from rest");
-    pages.paragraph(
-        "Flat ground under FLQR once more, with one imperfection after the other taken away; the gain stays the same.",
-    );
+    pages.section("Causes of the residual motion with FLQR");
+    pages.paragraph("Flat ground with FLQR, with one imperfection removed at a time; the gain is unchanged.");
     let columns = QUANTITIES.map(|(name, unit)| (format!("std of {name}"), unit));
     let columns: Vec<_> = columns.iter().map(|(name, unit)| (name.as_str(), *unit)).collect();
     let mut table =
@@ -38,10 +36,10 @@ pub(super) fn write(causes: &[(&'static str, Balanced)], pages: &mut Pages) {
         let values = QUANTITIES.into_iter().zip(deviations(run));
         let values: Vec<_> =
             values.map(|((quantity, unit), value)| format!("{} {unit} in {quantity}", sig(value))).collect();
-        format!("with {name}, {} are left", listed(&values))
+        format!("with {name}, {} remain", listed(&values))
     };
     pages.paragraph(format!(
-        "The largest falls of the standard deviation by one of them alone: {}. {}; {}.",
+        "Largest reductions of the standard deviation by a single change: {}. {}; {}.",
         told.join("; "),
         capitalized(&left(ideal)),
         left(frictionless),
@@ -49,7 +47,7 @@ pub(super) fn write(causes: &[(&'static str, Balanced)], pages: &mut Pages) {
     pages.paragraph(reach(&deviations(&ideal.1)));
 }
 
-/// The paper's standard deviations under FLQR beside what an ideal robot of this model has.
+/// The paper's standard deviations under FLQR next to what an ideal robot of this model has.
 fn reach(ideal: &[f64; 3]) -> String {
     let told = QUANTITIES.into_iter().enumerate().map(|(quantity, (name, unit))| {
         let [flat, bridge] = [FLAT, BRIDGE].map(|ground| ground.paper[quantity][1].std);
@@ -67,9 +65,8 @@ fn reach(ideal: &[f64; 3]) -> String {
     });
     let told: Vec<_> = told.collect();
     format!(
-        "The paper's own standard deviations under FLQR, on flat ground and on the bridge, against what is left here with \
-         friction as the only imperfection: {}. What is below is not reached with this robot and its feedforward by better \
-         sensors, motors or timing.",
+        "The paper's standard deviations with FLQR, on flat ground and on the bridge, compared with the simulation \
+         with friction as the only imperfection: {}. Lower values cannot be reached with this robot and its feedforward by better sensors, motors or timing.",
         told.join("; ")
     )
 }

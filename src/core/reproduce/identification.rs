@@ -2,17 +2,17 @@
 
 use super::pages::Pages;
 use super::paper;
+use super::phrases::{percent, sig};
 use super::table::{Digits, Table};
 use super::trials::Identified;
-use super::words::{percent, sig};
 use crate::friction::{Stribeck, StribeckParameters};
 use crate::identify::{Bounds, FitReport, PsoSettings, SearchBox};
-use crate::model_file::RobotModel;
+use crate::model::RobotModel;
 use crate::report::{Axis, Chart, Mark, Panel, Scale, Series};
 
-/// What the fitted curve may be off at any measured speed.
+/// Tolerance of the fitted curve at the measured speeds.
 const CURVE_TOLERANCE: f64 = 0.02;
-/// Share of the fastest speed that is shown once more, because the curve bends there.
+/// Fraction of the fastest speed that is shown once more, because the curve bends there.
 const SLOW: f64 = 0.06;
 const MOTORS: [&str; 2] = ["left", "right"];
 /// Rows of Tables 3 and 4 with the model file's keys.
@@ -28,9 +28,8 @@ const NAMES: [(&str, &str); 6] = [
 pub(super) fn write(robot: &RobotModel, motors: &[Identified; 2], pages: &mut Pages) {
     pages.section("Friction identification (section 4.2)");
     pages.paragraph(
-        "Each motor of the simulated bench is held at one speed after the other, the sensors' noise and steps included; \
-         each speed gives eight pairs of speed and torque (section 3.1), and the six parameters of Eq. 28 are fitted to \
-         them: the swarm of Algorithm 1 with Table 2, then a polish to the optimum.",
+        "Each motor of the simulated bench runs at a sequence of constant speeds, with sensor noise and quantization; \
+         each speed gives eight pairs of speed and torque (section 3.1). The six parameters of Eq. 28 are fitted to them by PSO (Algorithm 1 with Table 2), followed by local refinement.",
     );
     pages.table(motor_table(robot));
     pages.table(swarm_table());
@@ -54,12 +53,16 @@ fn motor_table(robot: &RobotModel) -> Table {
     let columns = [("rated torque", "N m"), ("rated speed", "rpm"), ("power", "W")];
     let rpm = |speed: f64| speed * 60.0 / std::f64::consts::TAU;
     let (torque, speed) = (robot.limits.torque_nm, robot.limits.rated_speed_rad_s);
-    let mut table = Table::new("table_1", "Table 1: in-wheel motors; ours are the limits of the model", &columns)
-            .digits(Digits::Short)
-        .note(
-            "The paper's torque times its speed is the mechanical power of a rating; the joint motors take no part in \
-             balancing.",
-        );
+    let mut table = Table::new(
+        "table_1",
+        "Table 1: in-wheel motors; simulation: limits of the model",
+        &columns,
+    )
+    .digits(Digits::Short)
+    .note(
+        "The product of the paper's torque and speed is the rated mechanical power; the joint motors are not \
+             used for balancing.",
+    );
     let power = torque.zip(speed).map(|(torque, speed)| torque * speed);
     table.push("in-wheel motor", paper::TABLE_1.map(Some), [torque, speed.map(rpm), power]);
     table
@@ -77,9 +80,10 @@ fn swarm_table() -> Table {
         ("velocity limit", ours.velocity_limit),
         ("iterations T", ours.iterations as f64),
     ];
-    let mut table = Table::new("table_2", "Table 2: settings of the swarm", &[("value", "")])
-        .digits(Digits::Short)
-        .note("The velocity limit is printed without a unit; here it is a share of each parameter's range.");
+    let mut table =
+        Table::new("table_2", "Table 2: PSO settings", &[("value", "")]).digits(Digits::Short).note(
+            "The velocity limit is printed without a unit; here it is a fraction of each parameter's range.",
+        );
     for ((name, value), paper) in rows.into_iter().zip(paper::TABLE_2) {
         table.push(name, [Some(paper)], [Some(value)]);
     }
@@ -95,7 +99,7 @@ fn in_table_order(values: [f64; 6]) -> [f64; 6] {
 fn bounds(motors: &[Identified; 2], pages: &mut Pages) {
     let ours = SearchBox::from_pairs(&motors[0].fit.pairs);
     let [lower, upper] = [ours.lower, ours.upper].map(in_table_order);
-    let title = "Table 3: bounds of the search; ours follow from the data, here those of the left motor";
+    let title = "Table 3: search bounds; simulation: bounds from the data of the left motor";
     let mut table = Table::new("table_3", title, &[("lower", ""), ("upper", "")]).digits(Digits::Short);
     for (row, (name, _)) in NAMES.into_iter().enumerate() {
         table.push(name, paper::TABLE_3[row].map(Some), [Some(lower[row]), Some(upper[row])]);
@@ -108,15 +112,18 @@ fn bounds(motors: &[Identified; 2], pages: &mut Pages) {
         .iter()
         .zip(MOTORS)
         .map(|(motor, name)| {
-            format!("{} N m ({name}) for {} N m with ours", sig(motor.as_printed.rmse), sig(motor.fit.rmse))
+            format!(
+                "{} N m ({name}) compared with {} N m with bounds from the data",
+                sig(motor.as_printed.rmse),
+                sig(motor.fit.rmse)
+            )
         })
         .collect();
     pages.contradiction(
         1,
         format!(
             "Table 3's lower bound of f_v, {}, excludes {excluded} of the 2 values that Table 4 prints, {} and {}. Within \
-             Table 3 as printed, the swarm ends at a root mean square error of {}; no curve within it is better than {} N m \
-             (left) and {} N m (right). Ours lets f_v begin at {}.",
+             Table 3 as printed, the RMS error of PSO is {}; the optimum within it is {} N m (left) and {} N m (right). Here, the lower bound of f_v is {}.",
             sig(least),
             sig(found[0]),
             sig(found[1]),
@@ -131,8 +138,8 @@ fn bounds(motors: &[Identified; 2], pages: &mut Pages) {
     pages.contradiction(
         6,
         format!(
-            "The lower bounds v_s = {} and ξ = {} are inside of Table 3 and make Eq. 28 singular (0/0) or f_s without \
-             effect. Where Table 3 is used as printed they are read as {} and {}; ours begin at {} rad/s and {}.",
+            "The lower bounds v_s = {} and ξ = {} are within Table 3, but make Eq. 28 singular (0/0) or f_s ineffective. \
+             Where Table 3 is used as printed, they are replaced by {} and {}; the bounds from the data begin at {} rad/s and {}.",
             sig(paper::TABLE_3[3][0]),
             sig(paper::TABLE_3[4][0]),
             sig(read_speed),
@@ -147,8 +154,8 @@ fn stop_rule(motors: &[Identified; 2]) -> String {
     let count = motors[0].fit.iterations;
     format!(
         "The search is to stop when the fitness is below a threshold in two consecutive iterations, but fitness is one \
-         over the error (Eq. 40), so larger is better; it is read as the error being below it. The paper names no \
-         threshold; ours is {}, so that all {count} iterations are done.",
+         over the error (Eq. 40), so larger is better; here the error is compared with the threshold. The paper \
+         gives no threshold; here it is {}, so that all {count} iterations run.",
         sig(PsoSettings::default().error_threshold)
     )
 }
@@ -165,7 +172,7 @@ fn values(curve: &StribeckParameters) -> [f64; 6] {
 }
 
 fn parameter_table(motors: &[Identified; 2]) -> Table {
-    let title = "Table 4: identified parameters; ours from the bench whose true friction is the model's";
+    let title = "Table 4: identified parameters; simulation: bench with the friction of the model";
     let mut table = Table::new("table_4", title, &[("left", ""), ("right", "")]);
     for (row, (name, key)) in NAMES.into_iter().enumerate() {
         let ours = motors.iter().map(|motor| motor.fit.parameters.get(key).map(|estimate| estimate.value));
@@ -176,7 +183,8 @@ fn parameter_table(motors: &[Identified; 2]) -> Table {
 
 fn interval_table(motors: &[Identified; 2]) -> Table {
     let columns = [("left, from", ""), ("left, to", ""), ("right, from", ""), ("right, to", "")];
-    let mut table = Table::new("table_4_intervals", "95 % intervals of our parameters", &columns);
+    let mut table =
+        Table::new("table_4_intervals", "95 % intervals of the simulation's parameters", &columns);
     for (name, key) in NAMES {
         let interval = |motor: &Identified| motor.fit.parameters.get(key).and_then(|estimate| estimate.ci95);
         let ends = motors.iter().flat_map(|motor| {
@@ -204,11 +212,12 @@ fn fitted_curve(fit: &FitReport) -> Option<Stribeck> {
 
 fn error_table(motors: &[Identified; 2]) -> Table {
     let columns =
-        [("pairs", ""), ("slowest", "rad/s"), ("fastest", "rad/s"), ("error", "N m"), ("curve off by", "%")];
-    let mut table = Table::new("section_4_2", "Section 4.2: the data and how well the curve fits them", &columns).note(
-        "Error: ours is the root mean square over the pairs (Eq. 32), the paper's what it calls standard deviation, \
-         without a unit. Curve off by: the fitted against the true one, relative, at the worst of the measured speeds.",
-    );
+        [("pairs", ""), ("slowest", "rad/s"), ("fastest", "rad/s"), ("error", "N m"), ("curve error", "%")];
+    let mut table =
+        Table::new("section_4_2", "Section 4.2: the data and how well the curve fits them", &columns).note(
+            "Error: RMS over the pairs (Eq. 32); in the paper, a standard deviation without a unit. Curve \
+         error: largest relative difference between the fitted and the true curve at the measured speeds.",
+        );
     for ((motor, name), error) in motors.iter().zip(MOTORS).zip(paper::ERROR) {
         let speeds = || motor.fit.pairs.iter().map(|pair| pair.speed_rad_s.abs());
         let ours = [
@@ -258,13 +267,13 @@ fn correlation(motors: &[Identified; 2]) -> String {
             });
         let (label, off) = relative.max_by(|a, b| a.1.total_cmp(&b.1))?;
         let label = label.split(',').next().unwrap_or(label);
-        Some(format!("{label} of the {name} motor is off by {}", percent(off)))
+        Some(format!("{label} of the {name} motor has an error of {}", percent(off)))
     });
     let furthest: Vec<_> = furthest.collect();
     format!(
-        "With the exponents of Table 4 the transition from static to sliding friction is not over at {} rad/s: {} (left) \
-         and {} (right) of it are left. So f_c, f_s, v_s and ξ trade off against each other and different sets fit \
-         equally well: here {}, while the curve is off by {} and {} at most. A fit is judged by its curve.",
+        "With the exponents of Table 4 the transition from static to sliding friction is not complete at {} rad/s: {} \
+         (left) and {} (right) of it remain. So f_c, f_s, v_s and ξ trade off against each other and different sets fit \
+         equally well: here {}, while the curve error is at most {} and {}. A fit should be assessed by its curve.",
         sig(paper::FASTEST_RAD_S),
         percent(left),
         percent(right),
@@ -296,8 +305,8 @@ fn error_unit(motors: &[Identified; 2]) -> String {
     };
     format!(
         "The standard deviations of the error, {} and {}, have no unit. From 0.1 to {} rad/s the friction of Table 4 is at \
-         most {} N m, and they are {verdict}. Ours are {} and {} N m; the swarm within Table 3 as printed ends at {} and {} \
-         N m.",
+         most {} N m, and they are {verdict}. In the simulation they are {} and {} N m; PSO within Table 3 as printed gives \
+         {} and {} N m.",
         sig(paper::ERROR[0]),
         sig(paper::ERROR[1]),
         sig(paper::FASTEST_RAD_S),
@@ -336,8 +345,8 @@ fn error_chart(motors: &[Identified; 2]) -> Chart {
         })
     });
     Chart {
-        title: "Figure 4: error of the swarm over its iterations".to_owned(),
-        description: "Root mean square error of the best particle, before the polish.".to_owned(),
+        title: "Figure 4: PSO error over the iterations".to_owned(),
+        description: "RMS error of the best particle, before local refinement.".to_owned(),
         x: Axis::new("Iteration", ""),
         panels: vec![Panel::new(Axis { scale: Scale::Log, ..Axis::new("Error", "N m") }, series.collect())],
     }
@@ -349,7 +358,7 @@ fn curve_chart(motors: &[Identified; 2], title: &str, fastest: f64) -> Chart {
         let pairs = motor.fit.pairs.iter().filter(|pair| pair.speed_rad_s.abs() <= fastest);
         let curve = |curve: Stribeck| {
             (-500..=500).map(move |i| fastest * f64::from(i) / 500.0).map(move |speed| {
-                // Nothing joins the two directions: at rest there is no single value.
+                // Nothing joins the two directions: at standstill there is no single value.
                 [speed, if speed == 0.0 { f64::NAN } else { curve.torque_nm(speed) }]
             })
         };
@@ -364,9 +373,7 @@ fn curve_chart(motors: &[Identified; 2], title: &str, fastest: f64) -> Chart {
     };
     Chart {
         title: title.to_owned(),
-        description:
-            "Pairs of the simulated bench, the friction it was given, and the curve that was fitted."
-                .to_owned(),
+        description: "Pairs of the simulated bench, its true friction, and the fitted curve.".to_owned(),
         x: Axis::new("Motor speed", "rad/s"),
         panels: motors.iter().zip(MOTORS).map(panel).collect(),
     }

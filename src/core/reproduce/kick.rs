@@ -3,9 +3,9 @@
 use super::balance::{CONTROLLERS, QUANTITIES, falls, panels, stood, three};
 use super::pages::Pages;
 use super::paper::{Range, TABLE_7};
+use super::phrases::sig;
 use super::table::{Digits, Table};
 use super::trials::{KickWindows, Runs};
-use super::words::sig;
 use crate::report::{Axis, Band, Chart};
 
 fn width(range: Range) -> f64 {
@@ -16,8 +16,8 @@ pub(super) fn write(runs: &Runs, windows: &KickWindows, pages: &mut Pages) {
     pages.section("A kick (section 4.4.3)");
     let [steady, disturbed] = [windows.steady_s, windows.disturbed_s];
     pages.paragraph(format!(
-        "The robot is kicked at {} s, with {} N for {} s; the paper gives the time alone. Steady is {} to {} s, when \
-         it has died away; disturbed is {} to {} s. The paper does not say which part of its run its table covers.",
+        "The robot is kicked at {} s, with {} N for {} s; the paper gives only the time. Steady state is {} to {} s, after \
+         the response has decayed; disturbed is {} to {} s. The paper does not state which part of its run the table covers.",
         sig(windows.kick_s),
         sig(windows.force_n),
         sig(windows.duration_s),
@@ -39,10 +39,7 @@ pub(super) fn write(runs: &Runs, windows: &KickWindows, pages: &mut Pages) {
     let band = |name: &str, x| Band { name: name.to_owned(), x: Some(x), y: None };
     pages.chart(Chart {
         title: "Figure 12: a kick".to_owned(),
-        description: format!(
-            "x, ẋ and pitch as the robot measures them; the kick comes at {} s.",
-            sig(windows.kick_s)
-        ),
+        description: format!("Measured x, ẋ and pitch; the kick is at {} s.", sig(windows.kick_s)),
         x: Axis { range: Some(windows.shown_s), ..Axis::new("Time", "s") },
         panels: panels(first, windows.shown_s, &[band("steady", steady), band("disturbed", disturbed)]),
     });
@@ -53,10 +50,9 @@ type Ranges = [[Range; 2]; 3];
 
 fn range_table(ranges: &[Ranges; 2]) -> Table {
     let columns = [("steady, least", ""), ("greatest", ""), ("disturbed, least", ""), ("greatest", "")];
-    let mut table =
-        Table::new("table_7", "Table 7: ranges under the kick and after it has died away", &columns)
-            .digits(Digits::Fixed(3))
-            .note("Where the paper prints one value in place of a range, it stands for both ends.");
+    let mut table = Table::new("table_7", "Table 7: ranges during the kick and in steady state", &columns)
+        .digits(Digits::Fixed(3))
+        .note("A single value in the paper is used for both ends of the range.");
     for (quantity, (name, unit)) in QUANTITIES.into_iter().enumerate() {
         for (controller, label) in CONTROLLERS.into_iter().enumerate() {
             let theirs = [TABLE_7[quantity].steady[controller], TABLE_7[quantity].disturbed[controller]];
@@ -84,9 +80,9 @@ fn paper_ranges() -> [Ranges; 2] {
 
 fn ratio_table(ranges: &[Ranges; 2]) -> Table {
     let columns = [("steady", ""), ("disturbed", "")];
-    let mut table = Table::new("table_7_ratios", "Table 7, width of LQR's range over FLQR's", &columns)
+    let mut table = Table::new("table_7_ratios", "Table 7, ratio of range widths LQR / FLQR", &columns)
         .digits(Digits::Fixed(1))
-        .note("None where the paper prints one value for FLQR.");
+        .note("Empty where the paper prints one value for FLQR.");
     for ((name, _), (theirs, ours)) in
         QUANTITIES.into_iter().zip(ratios(&paper_ranges()).into_iter().zip(ratios(ranges)))
     {
@@ -96,8 +92,7 @@ fn ratio_table(ranges: &[Ranges; 2]) -> Table {
 }
 
 fn seed_table(runs: &Runs, windows: &KickWindows) -> Table {
-    let title =
-        format!("Table 7, width of LQR's range over FLQR's with {} seeds of the noise", runs[0].len());
+    let title = format!("Table 7, ratio of range widths LQR / FLQR with {} noise seeds", runs[0].len());
     let columns = [("least", ""), ("median", ""), ("greatest", "")];
     let mut table = Table::new("table_7_seeds", title, &columns).digits(Digits::Fixed(1));
     let seeds = runs[0].iter().zip(&runs[1]);
@@ -122,28 +117,28 @@ fn finding(ranges: &[Ranges; 2], stood: bool, pages: &mut Pages) {
         .collect();
     pages.finding(
         "table_7_disturbed",
-        "Under the kick FLQR keeps to narrower ranges than LQR",
+        "During the kick, FLQR has narrower ranges than LQR",
         stood && ours.iter().all(|ratio| ratio[1] > 1.0),
-        format!("Width of LQR's range over FLQR's, ours for the paper's: {}.", told.join(", ")),
+        format!("Ratio of range widths LQR / FLQR, simulation (paper): {}.", told.join(", ")),
     );
 }
 
-/// What FLQR's printed speed under the kick asks of its printed displacement.
+/// Consistency of FLQR's printed speed and displacement during the kick.
 fn displacement() -> String {
-    const GRAVITY_M_S2: f64 = crate::robot::STANDARD_GRAVITY_M_S2;
+    const GRAVITY_M_S2: f64 = crate::model::STANDARD_GRAVITY_M_S2;
     let [x, speed, pitch] = [0, 1, 2].map(|quantity: usize| TABLE_7[quantity].disturbed[1]);
     let fastest = speed[0].abs().max(speed[1].abs());
     let steepest = width(pitch);
     let needed = fastest * fastest / (2.0 * GRAVITY_M_S2 * steepest);
     let allowed = width(x);
     let verdict = if needed > allowed {
-        "more than its own x allows, so not all three can be read as printed"
+        "more than its x allows, so the three printed values are inconsistent"
     } else {
-        "which its own x allows"
+        "which is consistent with its x"
     };
     format!(
-        "The paper's FLQR reaches {} m/s under the kick, within {} m of x and {} rad of pitch. A robot that balances brakes \
-         with about g times its pitch; from that speed, with all of that pitch, this takes {} m: {verdict}.",
+        "The paper's FLQR reaches {} m/s during the kick, within {} m of x and {} rad of pitch. A balancing robot \
+         decelerates at about g times its pitch; from that speed at that pitch, it needs {} m: {verdict}.",
         sig(fastest),
         sig(allowed),
         sig(steepest),

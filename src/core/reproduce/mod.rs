@@ -1,9 +1,10 @@
-//! Every experiment of the paper on the simulated robot, ours beside theirs.
+//! Every experiment of the paper on the simulated robot, ours next to theirs.
 //!
-//! The experiments run as [`crate::simulate`] runs them for everybody else; here they are chosen, put beside the
-//! paper's numbers and judged. Every sentence of the report that compares or concludes is made from the figures
+//! The experiments run as [`crate::simulate`] runs them for everybody else; here they are chosen, put next to the
+//! paper's numbers and assessed. Every sentence of the report that compares or concludes is made from the figures
 //! it names, so that another model or seed gives other sentences and not other figures under the same words.
 
+mod assumptions;
 mod balance;
 mod causes;
 mod identification;
@@ -11,13 +12,12 @@ mod kick;
 mod pages;
 mod paper;
 mod parameters;
-mod silence;
+mod phrases;
 mod table;
 #[cfg(test)]
 mod tests;
 mod tracking;
 mod trials;
-mod words;
 
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
@@ -29,12 +29,12 @@ pub use parameters::{Origin, Parameter};
 pub use table::{Column, Table};
 
 use crate::identify::FitError;
-use crate::model_file::Model;
+use crate::model::Model;
 use crate::report::{Block, Document};
 use crate::simulate::ExperimentError;
 use pages::Pages;
 
-/// What to reproduce with.
+/// Options of a reproduction.
 #[derive(Clone, Copy, Debug)]
 pub struct Settings<'a> {
     /// The model's file as it was written; its comments say where the numbers come from. May be empty.
@@ -66,11 +66,11 @@ pub struct Reproduction {
     pub seed: u64,
     /// Number of seeds of the balance experiments.
     pub seeds: usize,
-    /// Ours beside theirs.
+    /// Ours next to theirs.
     pub tables: Vec<Table>,
-    /// What was to be shown and what the paper claims, with whether it holds.
+    /// Claims of the paper, with results.
     pub findings: Vec<Finding>,
-    /// Where the paper contradicts itself, in their order of number.
+    /// Contradictions in the paper, by number.
     pub contradictions: Vec<Contradiction>,
     /// Every parameter of the model with where its number comes from.
     pub parameters: Vec<Parameter>,
@@ -79,7 +79,7 @@ pub struct Reproduction {
     pub document: Document,
 }
 
-/// Why the experiments could not be run.
+/// Reason why the experiments could not be run.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ReproduceError {
     /// A model of a single axis.
@@ -102,7 +102,7 @@ pub enum ReproduceError {
     #[error(transparent)]
     Fit(#[from] FitError),
     /// The caller broke off.
-    #[error("the experiments were stopped")]
+    #[error("the experiments were cancelled: start them again")]
     Cancelled,
 }
 
@@ -128,7 +128,7 @@ pub fn reproduce(
     causes::write(&trials.causes, &mut pages);
     kick::write(&trials.kick, &trials.windows, &mut pages);
     balance::abstracts_claim(&trials.flat, &trials.bridge, &mut pages);
-    silence::write(&parameters, settings.model_text, &mut pages);
+    assumptions::write(&parameters, settings.model_text, &mut pages);
     let document = document(&model.name, settings, &pages);
     let Pages { tables, findings, mut contradictions, .. } = pages;
     contradictions.sort_by_key(|contradiction| contradiction.number);
@@ -150,20 +150,20 @@ fn document(model: &str, settings: &Settings<'_>, pages: &Pages) -> Document {
     };
     let holds = pages.findings.iter().filter(|finding| finding.holds).count();
     let opening = [
-        Block::section("What holds and what does not"),
+        Block::section("Summary of the claims"),
         Block::paragraph(format!(
-            "{holds} of {} statements hold; the figures are in the sections.",
+            "{holds} of {} claims hold; the values are in the sections.",
             pages.findings.len()
         )),
         Block::List { numbered: false, items: pages.findings.iter().map(verdict).collect() },
     ];
     Document {
-        title: "The paper's experiments, ours beside theirs".to_owned(),
+        title: "Reproduction of the paper's experiments".to_owned(),
         summary: format!(
-            "Model: {model}; noise of {}. Theirs: Zhang, Zhou, Zhang, Zheng, Chen, \"Balance Control \
+            "Model: {model}; noise: {}. Paper: Zhang, Zhou, Zhang, Zheng, Chen, \"Balance Control \
              Method for Bipedal Wheel-Legged Robots Based on Friction Feedforward Linear Quadratic Regulator\", Sensors \
-             2025, 25(4), 1056. Ours: the simulated robot of the model, not a real one. The same model and seed give the \
-             same report.",
+             2025, 25(4), 1056. Simulation: the robot of the model, not a real one. The same model and seed \
+             give the same report.",
             match settings.seeds.get() {
                 1 => format!("seed {}", settings.seed),
                 count => format!("seeds {} to {}", settings.seed, settings.seed_number(count - 1)),

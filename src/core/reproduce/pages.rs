@@ -1,4 +1,4 @@
-//! What the sections are written on: the report, and with it the tables and findings for scripts.
+//! Output of the sections: the report, and with it the tables and findings for scripts.
 
 use serde::Serialize;
 
@@ -10,9 +10,9 @@ use crate::report::{Block, Chart, Tone};
 pub struct Finding {
     /// Key for scripts.
     pub id: &'static str,
-    /// What is asked.
+    /// Claim.
     pub claim: String,
-    /// Whether it holds.
+    /// True if it holds.
     pub holds: bool,
     /// The figures that decide it.
     pub figures: String,
@@ -23,7 +23,7 @@ pub struct Finding {
 pub struct Contradiction {
     /// From 1, in the order in which they are known.
     pub number: usize,
-    /// What it is and what is done here.
+    /// Description and solution used here.
     pub text: String,
 }
 
@@ -82,7 +82,7 @@ impl Pages {
         let text = text.into();
         self.blocks.push(Block::notice(
             Tone::Note,
-            format!("Reading the paper, {number} of {POINTS}"),
+            format!("Interpretation of the paper, {number} of {POINTS}"),
             text.clone(),
         ));
         self.contradictions.push(Contradiction { number, text });

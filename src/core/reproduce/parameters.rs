@@ -7,9 +7,9 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::model_file::{Model, RobotModel};
+use crate::model::{Model, RobotModel};
 
-/// Where a number comes from.
+/// Origin of a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Origin {
@@ -24,7 +24,7 @@ pub enum Origin {
     /// The file leaves it out, and the program's default stands.
     Default,
     /// The file does not say.
-    NotSaid,
+    NotStated,
 }
 
 /// A parameter of a model.
@@ -36,9 +36,9 @@ pub struct Parameter {
     pub value: String,
     /// Unit; empty where the file's comment gives none.
     pub unit: String,
-    /// Where the number comes from.
+    /// Origin of the number.
     pub origin: Origin,
-    /// How it was chosen, in the file's words.
+    /// Reason for the choice, as in the file.
     pub how: String,
 }
 
@@ -50,7 +50,7 @@ impl Origin {
             Self::Assumed => "assumed",
             Self::Standard => "standard",
             Self::Default => "default",
-            Self::NotSaid => "not said",
+            Self::NotStated => "not said",
         }
     }
 
@@ -68,7 +68,7 @@ impl Origin {
     }
 }
 
-/// What a comment says of a value.
+/// Comment of a value.
 #[derive(Clone, Default)]
 struct Remark {
     unit: String,
@@ -102,7 +102,7 @@ pub(super) fn parameters(complete: &str, text: &str) -> Vec<Parameter> {
     let parameter = |line: Line<'_>| {
         let remark = remarks.get(&line.key).cloned();
         let origin =
-            remark.as_ref().map_or(Origin::Default, |remark| remark.origin.unwrap_or(Origin::NotSaid));
+            remark.as_ref().map_or(Origin::Default, |remark| remark.origin.unwrap_or(Origin::NotStated));
         let Remark { unit, how, .. } = remark.unwrap_or_default();
         Parameter { key: line.key, value: line.value, unit, origin, how }
     };
@@ -150,7 +150,7 @@ fn lines(text: &str) -> impl Iterator<Item = Line<'_>> {
     })
 }
 
-/// What the file says before its first value: one text for each paragraph and each item of a list.
+/// Comments before the first value of the file: one text for each paragraph and each item of a list.
 pub(super) fn preface(text: &str) -> Vec<String> {
     let mut paragraphs: Vec<String> = Vec::new();
     let mut is_open = false;
@@ -214,7 +214,7 @@ mod tests {
             found,
             [
                 "robot.mass 2.0 kg Derived from two halves",
-                "robot.radius 1.0  NotSaid ",
+                "robot.radius 1.0  NotStated ",
                 "robot.extra 5  Default ",
                 "friction.left.a 1 N m Paper Table 4",
                 "friction.left.b 2 N m Assumed guessed",
@@ -248,7 +248,7 @@ mod tests {
         assert_eq!(origin("friction.left.static_nm"), Some(Origin::Paper));
         assert_eq!(origin("robot.wheel_radius_m"), Some(Origin::Assumed));
         for table in ["robot.", "friction.", "lqr.", "compensation."] {
-            let silent = |p: &&Parameter| p.key.starts_with(table) && p.origin == Origin::NotSaid;
+            let silent = |p: &&Parameter| p.key.starts_with(table) && p.origin == Origin::NotStated;
             let silent: Vec<_> =
                 found.iter().filter(silent).filter(|p| p.key != "robot.gravity_m_s2").collect();
             assert!(silent.is_empty(), "{silent:?}");

@@ -2,10 +2,10 @@
 
 use serde::Serialize;
 
-use super::words::sig;
+use super::phrases::sig;
 use crate::report::{Cell, Column as ReportColumn, Table as ReportTable, number};
 
-/// Ours beside theirs.
+/// Ours next to theirs.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Table {
     /// Key for scripts, such as `table_5`.
@@ -16,9 +16,9 @@ pub struct Table {
     pub columns: Vec<Column>,
     /// Names of the rows, with the unit where it differs from row to row.
     pub rows: Vec<String>,
-    /// Ours, row by row; none where there is no such number.
+    /// Ours, row by row; `None` if there is no such number.
     pub ours: Vec<Vec<Option<f64>>>,
-    /// The paper's, row by row; none where it prints none.
+    /// The paper's, row by row; `None` if it prints none.
     pub paper: Vec<Vec<Option<f64>>>,
     #[serde(skip)]
     pub(super) digits: Digits,
@@ -35,7 +35,7 @@ pub struct Column {
     pub unit: &'static str,
 }
 
-/// How a table's numbers are shown.
+/// Number format of a table.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Digits {
     Fixed(usize),

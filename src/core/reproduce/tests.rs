@@ -111,7 +111,7 @@ fn a_fall_is_told() {
     let mut pages = Pages::default();
     balance::falls(&both, &mut pages);
     assert_eq!(pages.blocks.len(), 1);
-    assert!(format!("{:?}", pages.blocks[0]).contains("under LQR the robot fell at 3.2 s"));
+    assert!(format!("{:?}", pages.blocks[0]).contains("with LQR the robot fell at 3.2 s"));
     // A fall makes LQR's deviations large, which is no merit of FLQR.
     let model = presets::paper();
     let mut pages = Pages::default();

@@ -1,10 +1,10 @@
 //! Section 4.3: Figures 6 and 7.
 
 use super::pages::Pages;
+use super::phrases::{listed, sig};
 use super::table::{Digits, Table};
 use super::trials::Tracked;
-use super::words::{listed, sig};
-use crate::model_file::RobotModel;
+use crate::model::RobotModel;
 use crate::report::{Axis, Chart, Limit, Mark, Panel, Series};
 use crate::simulate::SpeedGains;
 
@@ -16,8 +16,8 @@ const WAYS: [&str; 2] = ["without compensation", "with compensation"];
 pub(super) fn write(robot: &RobotModel, pairs: &[Pair], target_rad_s: f64, pages: &mut Pages) {
     pages.section("Speed tracking (section 4.3)");
     pages.paragraph(format!(
-        "Wheels off the ground, torque mode, a PI controller and a target of {} rad/s, without and with the friction fed \
-         forward. The paper shows curves and no numbers, and says that the response is faster with compensation.",
+        "Wheels off the ground, torque mode, PI controller with a target of {} rad/s, without and with friction feedforward. \
+         The paper shows curves without numbers and states that the response is faster with compensation.",
         sig(target_rad_s)
     ));
     for (motor, (name, figure)) in MOTORS.into_iter().enumerate() {
@@ -35,7 +35,7 @@ pub(super) fn write(robot: &RobotModel, pairs: &[Pair], target_rad_s: f64, pages
     }
 }
 
-/// How fast each pair of gains makes the loop, and what the delay takes from it.
+/// Bandwidth of each gain pair, and its phase loss by the delay.
 fn crossovers(robot: &RobotModel, pairs: &[Pair]) -> String {
     let (inertia, delay) = (robot.parameters.wheel_inertia_kg_m2, robot.actuation.delay_s);
     let told = pairs.iter().map(|pair| {
@@ -43,7 +43,7 @@ fn crossovers(robot: &RobotModel, pairs: &[Pair]) -> String {
         let speed_gains = SpeedGains { kp, ki };
         let rest = speed_gains.phase_margin_rad(inertia, delay);
         format!(
-            "{} crosses over at {} rad/s with {} of the phase left",
+            "{} has a crossover at {} rad/s and a phase margin of {}",
             gains(pair),
             sig(speed_gains.crossover_rad_s(inertia)),
             if rest > 0.0 { format!("{} rad", sig(rest)) } else { "none".to_owned() },
@@ -51,8 +51,8 @@ fn crossovers(robot: &RobotModel, pairs: &[Pair]) -> String {
     });
     let told: Vec<_> = told.collect();
     format!(
-        "A wheel in the air is little more than its inertia, {} kg m², with {} s of delay and half a tick of hold: {}. The \
-         paper gives neither inertia nor delay.",
+        "A wheel in the air is essentially an inertia of {} kg m² with {} s of delay and half a sample of hold: {}. \
+         The paper gives neither inertia nor delay.",
         sig(inertia),
         sig(delay),
         told.join("; ")
@@ -69,8 +69,8 @@ fn table(pairs: &[Pair], motor: usize, name: &str, figure: usize) -> Table {
     let mut table = Table::new(format!("figure_{figure}"), title, &columns)
         .digits(Digits::Fixed(3))
         .note(
-            "Rise time: from 10 % to 90 % of the target; none where 90 % is never reached. Swing: peak to peak of the measured speed over \
-             the last second. The paper prints no numbers.",
+            "Rise time: from 10 % to 90 % of the target; empty if 90 % is never reached. Swing: peak-to-peak measured speed \
+             over the last second. The paper gives no numbers.",
         );
     for pair in pairs {
         for (tracked, way) in pair.iter().zip(WAYS) {
@@ -100,7 +100,7 @@ fn chart(pairs: &[Pair], motor: usize, name: &str, figure: usize, target_rad_s: 
     };
     Chart {
         title: format!("Figure {figure}: speed of the {name} motor"),
-        description: "Measured speed after a step of the target, for the paper's three pairs of gains."
+        description: "Measured speed after a step of the target, for the paper's three gain pairs."
             .to_owned(),
         x: Axis { range: Some([0.0, end_s]), ..Axis::new("Time", "s") },
         panels: pairs.iter().map(panel).collect(),
@@ -133,8 +133,8 @@ fn finding(pairs: &[Pair], pages: &mut Pages) {
     }
     pages.finding(
         "figures_6_7_rise",
-        "With compensation the rise from 10 to 90 % of the target is never slower than without",
+        "The rise time from 10 to 90 % of the target is never longer with compensation than without",
         slower == 0,
-        format!("Rise times with compensation for those without: {}.", listed(&told)),
+        format!("Rise times with compensation (without): {}.", listed(&told)),
     );
 }

@@ -6,20 +6,19 @@ use super::paper::{Range, SPEED_GAINS};
 use super::{ReproduceError, Settings};
 use crate::control::DEFAULT_COMPENSATION;
 use crate::friction::{Compensation, Stribeck, StribeckParameters};
-use crate::identify::{self, Bounds, FitOptions, FitReport, Method, Motor, SearchBox};
-use crate::model_file::{Model, Rig, RobotModel};
+use crate::identify::{self, Bounds, FitOptions, FitReport, Method, SearchBox};
+use crate::model::{Actuation, Model, Motor, MotorLimits, Rig, RobotModel, SensorSettings};
 use crate::parallel;
 use crate::record::Sample;
-use crate::robot::{Actuation, MotorLimits, SensorSettings};
 use crate::simulate::{
     ControllerChoice, Experiment, Outcome, Push, Scenario, SpeedGains, Statistics, StepResponse, Summary, run,
 };
 
-/// How long a kick counts as a disturbance, s.
+/// Duration of the disturbance by a kick, s.
 const DISTURBED_S: f64 = 5.0;
 /// End of a speed tracking that shows whether it comes to rest, s.
 const LAST_S: f64 = 1.0;
-/// How much of a run with a kick its figure shows, s.
+/// Length of the figure of a run with a kick, s.
 const KICK_SHOWN_S: f64 = 30.0;
 
 /// One motor's identification on the bench.
@@ -40,7 +39,7 @@ pub(super) struct Tracked {
     pub(super) response: [StepResponse; 2],
     /// Peak to peak of the measured speed over the last second, rad/s.
     pub(super) ripple_rad_s: [f64; 2],
-    /// What was known before the run.
+    /// Warnings known before the run.
     pub(super) warnings: Vec<String>,
     /// Measured speed over time of both motors.
     pub(super) speed: [Vec<[f64; 2]>; 2],
@@ -87,18 +86,18 @@ pub(super) struct Trials {
 /// A change of the robot that the controller is made for, and of the one that is simulated.
 type Change = fn([&mut RobotModel; 2]);
 
-/// What keeps FLQR from rest, each taken away by itself.
+/// Causes of the residual motion with FLQR, each taken away by itself.
 const CAUSES: [(&str, Change); 7] = [
     ("as modelled", |_| ()),
     ("no torque noise", |[_, actual]| actual.actuation.torque_noise_nm = 0.0),
-    ("sensors without noise and steps", |[_, actual]| exact_sensors(actual)),
+    ("sensors without noise and quantization", |[_, actual]| exact_sensors(actual)),
     ("no delay", |[_, actual]| actual.actuation.delay_s = 0.0),
-    ("the whole friction compensated", |[declared, _]| compensate_all(declared)),
-    ("none of these, no limits and no held readings", |[declared, actual]| {
+    ("full friction compensation", |[declared, _]| compensate_all(declared)),
+    ("none of these, no limits and no sample-and-hold", |[declared, actual]| {
         compensate_all(declared);
         ideal(actual);
     }),
-    ("none of these, and no friction either", |[declared, actual]| {
+    ("none of these, and no friction", |[declared, actual]| {
         ideal(actual);
         without_friction([declared, actual]);
     }),

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use super::simulation::TICK_S;
-use crate::robot::{Actuation, MotorLimits};
+use crate::model::{Actuation, MotorLimits};
 
 /// One motor with its command line: resolution of the command, transport delay, torque limit, slew limit,
 /// and the limit that the supply's voltage sets at high speed, in this order. Deterministic; noise is the
@@ -18,7 +18,7 @@ pub struct Actuator {
 }
 
 impl Actuator {
-    /// A motor that has been asked for no torque yet. The delay is rounded to whole ticks of 1 ms.
+    /// A motor that has been requested no torque yet. The delay is rounded to whole ticks of 1 ms.
     pub fn new(limits: &MotorLimits, actuation: &Actuation) -> Self {
         let ticks = (actuation.delay_s / TICK_S).round() as usize;
         Self {
@@ -30,7 +30,7 @@ impl Actuator {
     }
 
     /// One tick: takes the torque that the controller asks for and gives the one on the shaft, N m, that
-    /// was asked for a delay ago, with the motor at its present speed, rad/s.
+    /// was requested a delay ago, with the motor at its present speed, rad/s.
     pub fn step(&mut self, asked_nm: f64, motor_speed_rad_s: f64) -> f64 {
         self.under_way.push_back(self.in_steps(asked_nm));
         let arrived = self.under_way.pop_front().expect("a torque has just been pushed");

@@ -3,22 +3,19 @@
 use std::ops::ControlFlow;
 
 use super::experiment::{Experiment, Push};
-use super::ground::Ground;
 use super::plant::{Plant, Pose};
 use super::scenario::Scenario;
 use super::simulation::{Command, Fall, NotFinite, Simulation, SimulationError, SimulationSettings, TICK_S};
 use super::statistics::Statistics;
 use crate::control::{BalanceController, Reference};
-use crate::identify::excitation::{
-    BALANCE_MULTISINE_NM, Multisine, OutAndBack, PathPoint, SmoothMove, multisines,
-};
-use crate::model_file::RobotModel;
+use crate::excitation::{BALANCE_MULTISINE_NM, Multisine, OutAndBack, PathPoint, SmoothMove, multisines};
+use crate::model::Ground;
+use crate::model::{RobotModel, State};
 use crate::record::Sample;
-use crate::robot::State;
 
 /// Pitch at which the robot is let go, rad: nearly upright (assumed).
 const LET_GO_PITCH_RAD: f64 = 0.05;
-/// Where the bridge begins, its ramps, deck and height, m; the robot stops at the middle of the deck.
+/// Start of the bridge, its ramps, deck and height, m; the robot stops at the middle of the deck.
 const BRIDGE_M: [f64; 4] = [0.3, 0.4, 0.6, 0.04];
 const BRIDGE_TARGET_M: f64 = 1.0;
 const BRIDGE_DRIVE: SmoothMove = SmoothMove { start_s: 2.0, duration_s: 8.0, distance_m: BRIDGE_TARGET_M };
@@ -27,10 +24,10 @@ const CRUISE_PEAK_M_S: f64 = 0.4;
 /// Ticks from one true pose to the next.
 const POSE_TICKS: usize = 10;
 
-/// What came of a run on the ground.
+/// Outcome of a run on the ground.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Run {
-    /// What the robot recorded, one row every 1 ms from 0, until the end, a fall or a stop by the watcher.
+    /// Recording, one row per 1 ms from 0 until the end, a fall or a stop by the watcher.
     pub samples: Vec<Sample>,
     /// Statistics of the samples.
     pub statistics: Statistics,
@@ -38,11 +35,11 @@ pub struct Run {
     pub fall: Option<Fall>,
     /// The truth every 10 ms.
     pub poses: Vec<TimedPose>,
-    /// What was known before the run.
+    /// Warnings known before the run.
     pub warnings: Vec<String>,
-    /// Where the robot is to stand in the end, m; statistics of the steady point are taken about it.
+    /// Final position setpoint, m; statistics of the steady point are taken about it.
     pub target_x_m: f64,
-    /// Where the motion stopped being finite, if it did; the samples end there.
+    /// Step at which the motion became non-finite, if any; the samples end there.
     pub(super) not_finite: Option<NotFinite>,
 }
 
@@ -55,7 +52,7 @@ pub struct TimedPose {
     pub pose: Pose,
 }
 
-/// What a scenario asks of the robot and where.
+/// Setpoints and ground of a scenario.
 pub(super) struct Course {
     initial: State,
     grounds: [Ground; 2],

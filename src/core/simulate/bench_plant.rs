@@ -6,7 +6,7 @@ use std::ops::RangeInclusive;
 
 use super::change::{MAX_CHANGES, first_below_zero};
 use super::planar::sliding::SlidingFriction;
-use crate::effects::{Action, EffectLaw, Law, Moment};
+use crate::effects::{Action, EffectLaw, Law, MotionSample};
 use crate::friction::Stribeck;
 
 /// A shaft in motion.
@@ -15,7 +15,7 @@ pub struct BenchPlant {
     inertia_kg_m2: f64,
     gravity_torque_nm: f64,
     sliding: SlidingFriction,
-    /// Torques that friction can take at rest, N m; none where no torque is needed to turn a resting shaft.
+    /// Torques that friction can take at standstill, N m; `None` if no torque is needed to turn a resting shaft.
     range_nm: Option<RangeInclusive<f64>>,
     shaft: Shaft,
     phase: Phase,
@@ -80,7 +80,7 @@ impl BenchPlant {
         }
     }
 
-    /// The same with effects on it.
+    /// Creates it with effects.
     pub fn with_effects(self, laws: Vec<EffectLaw>) -> Self {
         if laws.is_empty() {
             return self;
@@ -96,7 +96,7 @@ impl BenchPlant {
         Self { range_nm: Some(range_nm), phase, effects, ..self }
     }
 
-    /// The same at a time of its effects, s.
+    /// Same at a given time of its effects, s.
     pub fn at_time(mut self, time_s: f64) -> Self {
         if let Some(effects) = &mut self.effects {
             effects.time_s = time_s;
@@ -114,18 +114,31 @@ impl BenchPlant {
         self.shaft.speed
     }
 
-    /// Whether friction holds the shaft.
+    /// Returns whether friction holds the shaft.
     pub fn stuck(&self) -> bool {
         self.phase == Phase::Stuck
     }
 
-    /// Whether angle and speed are finite numbers.
+    /// Returns whether angle and speed are finite numbers.
     pub fn is_finite(&self) -> bool {
         self.shaft.angle.is_finite() && self.shaft.speed.is_finite()
     }
 
     /// Moves on by `dt_s` under the motor's torque in `substeps` equal steps of order 4. A torque that is
     /// not finite makes the motion not finite and nothing else.
+    ///
+    /// ```
+    /// use flqr_core::friction::{Stribeck, StribeckParameters};
+    /// use flqr_core::simulate::BenchPlant;
+    ///
+    /// let friction = Stribeck::new(StribeckParameters { coulomb_nm: 0.2, static_nm: 0.3, ..StribeckParameters::NONE })?;
+    /// let mut shaft = BenchPlant::new(0.01, 0.0, Some(friction), 0.0, 0.0);
+    /// shaft.advance(0.25, 1.0, 1000);
+    /// assert!(shaft.stuck()); // below the static friction
+    /// shaft.advance(0.35, 1.0, 1000);
+    /// assert!(shaft.speed_rad_s() > 0.0);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn advance(&mut self, torque_nm: f64, dt_s: f64, substeps: u32) {
         let step = dt_s / f64::from(substeps);
         for _ in 0..substeps {
@@ -215,13 +228,13 @@ impl BenchPlant {
 }
 
 impl Effects {
-    /// What they do over the next substep: as of its middle, to which the motion is carried on with the acceleration
+    /// Action over the next substep: as of its middle, to which the motion is carried on with the acceleration
     /// of the last one.
     fn act(&mut self, shaft: &Shaft, held: bool, torque_nm: f64, step: f64) -> Action {
         let before = self.speed_before.replace(shaft.speed).unwrap_or(shaft.speed);
         let acceleration = if held { 0.0 } else { (shaft.speed - before) / step };
         let half = 0.5 * step;
-        let moment = Moment {
+        let moment = MotionSample {
             time_s: self.time_s + half,
             dt_s: step,
             motor_angle_rad: shaft.angle + half * shaft.speed,
@@ -229,7 +242,7 @@ impl Effects {
             motor_accel_rad_s2: acceleration,
             torque_nm,
             torque_sum_nm: torque_nm,
-            ..Moment::default()
+            ..MotionSample::default()
         };
         self.time_s += step;
         self.laws.iter_mut().fold(Action::default(), |sum, law| sum.plus(1.0, &law.act(&moment)))

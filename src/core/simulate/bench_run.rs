@@ -8,24 +8,24 @@ use super::sensors::Sensors;
 use super::simulation::{NotFinite, SENSOR_STREAM, SimulationSettings, TICK_S};
 use super::statistics::{Summary, between, summary};
 use super::tracking::StepResponse;
-use crate::control::{Readings, SpeedPi, SpeedProgram, SpeedRun};
-use crate::effects::{Effect, EffectFeedforward, EffectLaw, Machine, Moment};
+use crate::control::{SpeedPi, SpeedProgram, SpeedRun};
+use crate::effects::{EffectFeedforward, EffectLaw, Machine, MotionSample};
 use crate::friction::{Compensation, Stribeck};
-use crate::identify::Motor;
-use crate::model_file::{AxisModel, AxisParameters, RobotModel};
-use crate::record::BenchSample;
-use crate::robot::{Actuation, MotorLimits, SensorSettings};
+use crate::model::{
+    Actuation, AxisModel, AxisParameters, Effect, Motor, MotorLimits, RobotModel, SensorSettings,
+};
+use crate::record::{BenchSample, Readings};
 
-/// What came of a run in the air.
+/// Outcome of a run in the air.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BenchRun {
-    /// What was recorded, one row every 1 ms from 0, until the end or a stop by the watcher.
+    /// Recording, one row every 1 ms from 0, until the end or a stop by the watcher.
     pub samples: Vec<BenchSample>,
-    /// How both motors followed a step of the target; none in runs without one.
+    /// Step responses of both motors; `None` without a step.
     pub tracking: Option<[StepResponse; 2]>,
-    /// What was known before the run.
+    /// Warnings known before the run.
     pub warnings: Vec<String>,
-    /// Where the motion stopped being finite, if it did; the samples end there.
+    /// Step at which the motion became non-finite, if any; the samples end there.
     pub(super) not_finite: Option<NotFinite>,
 }
 
@@ -35,7 +35,7 @@ impl BenchRun {
         Self::statistics_of(&self.samples, motor)
     }
 
-    /// The same from one time to another, both included; none without samples between them.
+    /// Statistics between two times, inclusive; `None` without samples between them.
     pub fn statistics_between(&self, motor: Motor, range_s: [f64; 2]) -> Option<[Summary; 2]> {
         let counted = between(&self.samples, |sample| sample.time_s, range_s);
         (!counted.is_empty()).then(|| Self::statistics_of(counted, motor))
@@ -132,7 +132,8 @@ struct Bench<'a> {
     sensors: Sensors,
 }
 
-/// Runs a program for `ticks` under the speed control, with effects fed forward or not; `watch` hears the share that is done.
+/// Runs a program for `ticks` under the speed control, with effects fed forward or not; `watch` hears the share that
+/// is done.
 pub(super) fn run(
     rig: &BenchRig,
     control: &[SpeedPi; 2],
@@ -208,16 +209,16 @@ impl<'a> Bench<'a> {
         sample
     }
 
-    /// What has to be asked of the motors for torques.
+    /// Returns the commands that give the desired torques.
     fn with_effects(&self, readings: &Readings, torque_nm: [f64; 2]) -> [f64; 2] {
         let Some(fed) = &self.fed else { return torque_nm };
         let limit_nm = self.rig.torque_limit_nm();
         Motor::BOTH.map(|motor| {
             let index = motor as usize;
-            let moment = Moment {
+            let moment = MotionSample {
                 motor_angle_rad: readings.motor_angle_rad[index],
                 motor_speed_rad_s: readings.motor_speed_rad_s[index],
-                ..Moment::default()
+                ..MotionSample::default()
             };
             fed.asked_nm(motor, &moment, torque_nm[index]).clamp(-limit_nm, limit_nm)
         })

@@ -4,8 +4,9 @@ use std::ops::ControlFlow;
 
 use super::*;
 use crate::friction::Stribeck;
-use crate::identify::{self, FitOptions, Motor};
-use crate::model_file::{Model, presets};
+use crate::identify::{self, FitOptions};
+use crate::model::{Model, Motor};
+use crate::model_file::presets;
 use crate::record::Log;
 
 const MOTORS: [Motor; 2] = [Motor::Left, Motor::Right];

@@ -2,10 +2,10 @@
 
 /// Changes of phase within one substep after which resting shafts are taken as stuck for the rest of it.
 pub(super) const MAX_CHANGES: usize = 8;
-/// Share of a step to which the instant is located.
+/// Fraction of a step to which the instant is located.
 const TOLERANCE: f64 = 1e-9;
 
-/// Share of a step at which `margin_at` has just fallen below 0, for a margin of at least 0 at share 0 and
+/// Fraction of a step at which `margin_at` has just fallen below 0, for a margin of at least 0 at share 0 and
 /// below 0 at share 1: by secants, with a bisection after each that was slow. A margin that is not a
 /// number counts as below 0.
 pub(super) fn first_below_zero(start: f64, end: f64, margin_at: impl Fn(f64) -> f64) -> f64 {

@@ -14,15 +14,12 @@ use crate::control::{
     BalanceController, ControlError, ControllerKind, DEFAULT_COMPENSATION, SpeedGains, SpeedPi, SpeedProgram,
 };
 use crate::effects::EffectFeedforward;
+use crate::excitation::{SpeedSweep, Step};
 use crate::friction::{Compensation, Feedforward};
-use crate::identify::Motor;
-use crate::identify::excitation::{SpeedSweep, Step};
 use crate::lqr::{self, DesignError, SampledLoop};
-use crate::model_file::{Model, Rig, RobotModel};
+use crate::model::{Model, Motor, Payload, Rig, RobotModel};
 use crate::parameter::{finite, not_negative, within};
-use crate::record::Log;
-use crate::record::{BenchSample, Sample};
-use crate::robot::Payload;
+use crate::record::{BenchSample, Log, Sample};
 
 /// Target of the speed tracking (section 4.3), rad/s.
 const TARGET_RAD_S: f64 = 5.0;
@@ -46,12 +43,12 @@ impl Push {
     pub const KICK: Self = Self { start_s: 8.5, force_n: 30.0, duration_s: 0.1, height_m: None };
 }
 
-/// What drives the robot in an experiment.
+/// Controller of an experiment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ControllerChoice {
     /// State feedback; in the air PI speed control.
     Lqr,
-    /// The same with friction fed forward.
+    /// With friction feedforward.
     Flqr,
     /// PI speed control, for experiments in the air.
     Pi,
@@ -74,9 +71,9 @@ impl ControllerChoice {
 /// Settings of one run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Experiment {
-    /// What the robot is put through.
+    /// Scenario.
     pub scenario: Scenario,
-    /// What drives it.
+    /// Controller.
     pub controller: ControllerChoice,
     /// Simulated time, s, at most 3600, rounded to 1 ms.
     pub seconds: f64,
@@ -97,11 +94,11 @@ pub struct Experiment {
     pub slope_rad: f64,
     /// A load on the body in place of the model's, which the controller does not know of.
     pub payload: Option<Payload>,
-    /// Torques of a multisine on the ground as a share of the usual ones.
+    /// Torques of a multisine on the ground as a fraction of the usual ones.
     pub torque_scale: f64,
 }
 
-/// Why an experiment has no outcome.
+/// Reason why an experiment has no outcome.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ExperimentError {
     /// Speed control cannot balance.
@@ -110,19 +107,19 @@ pub enum ExperimentError {
          or a scenario in the air (speed-tracking, friction-sweep, multisine)"
     )]
     PiOnGround {
-        /// What was asked for.
+        /// Requested value.
         scenario: Scenario,
     },
     /// A setting that would change nothing.
     #[error("{setting} has no effect in {scenario} with {}: leave it out, or use {place}", controller.name())]
     NoEffect {
-        /// What was set.
+        /// Setting.
         setting: &'static str,
-        /// What was asked for.
+        /// Requested value.
         scenario: Scenario,
         /// The controller with it.
         controller: ControllerChoice,
-        /// Where it would have one.
+        /// Scenarios in which it has an effect.
         place: &'static str,
     },
     /// A problem of the robot that is simulated, where it is not the one that makes the controller.
@@ -134,7 +131,7 @@ pub enum ExperimentError {
         controller.name()
     )]
     NeedsRobot {
-        /// What was asked for.
+        /// Requested value.
         scenario: Scenario,
         /// The controller with it.
         controller: ControllerChoice,
@@ -147,7 +144,7 @@ pub enum ExperimentError {
          kind = \"rotary\""
     )]
     NeedsShaft {
-        /// What was asked for.
+        /// Requested value.
         scenario: Scenario,
         /// Name of the model.
         name: String,
@@ -188,13 +185,13 @@ pub enum ExperimentError {
 }
 
 impl ExperimentError {
-    /// Whether scenario and controller do not go together, whatever the models.
+    /// Returns whether scenario and controller do not go together, whatever the models.
     pub fn is_wrong_usage(&self) -> bool {
         matches!(self, Self::PiOnGround { .. } | Self::NoEffect { .. })
     }
 }
 
-/// What came of an experiment.
+/// Outcome of an experiment.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
     /// The robot on the ground.
@@ -204,7 +201,7 @@ pub enum Outcome {
 }
 
 impl Outcome {
-    /// What was recorded: a robot log, or a bench log of one motor with its measured and its target speed.
+    /// Recording: a robot log, or a bench log of one motor with its measured and its target speed.
     pub fn log(&self, motor: Motor) -> Log {
         match self {
             Self::Ground(run) => log_of(Sample::COLUMNS, run.samples.iter().map(Sample::to_row)),
@@ -214,7 +211,7 @@ impl Outcome {
         }
     }
 
-    /// What was known before the run, in sentences.
+    /// Warnings known before the run.
     pub fn warnings(&self) -> &[String] {
         match self {
             Self::Ground(run) => &run.warnings,
@@ -250,6 +247,20 @@ fn log_of<const COLUMNS: usize>(
 /// # Errors
 /// Settings or models that do not fit the scenario, a design that does not exist, a motion that does not stay
 /// finite; what was recorded of it comes with the error.
+///
+/// ```
+/// use std::ops::ControlFlow;
+///
+/// use flqr_core::model_file::presets;
+/// use flqr_core::simulate::{ControllerChoice, Experiment, Outcome, Scenario, run};
+///
+/// let model = presets::paper();
+/// let experiment = Experiment { seconds: 20.0, ..Experiment::new(Scenario::Flat, ControllerChoice::Flqr) };
+/// let outcome = run(&experiment, &model, &model, &mut |_| ControlFlow::Continue(()))?;
+/// let Outcome::Ground(run) = outcome else { return Err("not on the ground".into()) };
+/// assert!(run.statistics.settled && !run.statistics.fell);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn run(
     experiment: &Experiment,
     declared: &Model,
@@ -279,7 +290,7 @@ pub fn run(
 enum Plan {
     Ground {
         controller: BalanceController,
-        /// Whether the gain was given rather than designed.
+        /// True if the gain was given rather than designed.
         given: bool,
         declared: Box<RobotModel>,
         actual: Box<RobotModel>,
@@ -313,13 +324,13 @@ impl Experiment {
         }
     }
 
-    /// Whether the robot balances; otherwise its wheels are in the air.
+    /// Returns whether the robot balances; otherwise its wheels are in the air.
     pub fn on_ground(&self) -> bool {
         self.scenario.on_ground()
             && !(self.scenario == Scenario::Multisine && self.controller == ControllerChoice::Pi)
     }
 
-    /// What is known before the run, in sentences: a gain whose loop is unstable as it runs.
+    /// Returns warnings known before the run: a gain whose loop is unstable when sampled.
     ///
     /// # Errors
     /// As [`run`], except for the motion.
@@ -327,7 +338,7 @@ impl Experiment {
         Ok(Plan::new(self, declared, actual)?.warnings())
     }
 
-    /// Whether scenario, controller and settings go together, whatever the models.
+    /// Returns whether scenario, controller and settings go together, whatever the models.
     ///
     /// # Errors
     /// Speed control on the ground, and settings that would change nothing; all are wrong usage.
@@ -339,7 +350,7 @@ impl Experiment {
         let ground = "a scenario on the ground";
         let ignored = [
             ("a gain", !self.on_ground() && self.gain.is_some(), ground),
-            ("a height of the legs", !self.on_ground() && self.leg_height_m.is_some(), ground),
+            ("a leg height", !self.on_ground() && self.leg_height_m.is_some(), ground),
             ("a slope", !self.on_ground() && self.slope_rad != 0.0, ground),
             ("a payload", !self.on_ground() && self.payload.is_some(), ground),
             (
@@ -370,7 +381,7 @@ impl Experiment {
         within("seconds", self.seconds, TICK_S..=MAX_SECONDS, "from 0.001 to 3600")?;
         within("target_speed_rad_s", self.target_speed_rad_s, -1e3..=1e3, "from -1000 to 1000")?;
         if self.target_speed_rad_s == 0.0 {
-            let allowed = "other than 0, from which the shaft starts";
+            let allowed = "other than 0, the initial speed";
             return Err(
                 ParameterError { name: "target_speed_rad_s", value: 0.0, allowed: allowed.into() }.into()
             );
@@ -386,7 +397,7 @@ impl Experiment {
         Ok(finite("height_m", self.kick.height_m.unwrap_or(0.0))?)
     }
 
-    /// The robot with its legs as asked for.
+    /// The robot with its legs as requested.
     fn robot(&self, model: &Model) -> Result<Box<RobotModel>, ExperimentError> {
         let Rig::Robot(robot) = &model.rig else {
             let (scenario, controller) = (self.scenario, self.controller);
@@ -467,24 +478,22 @@ impl Plan {
     }
 
     fn warnings(&self) -> Vec<String> {
-        let unstable = |declared: bool, actual: bool, loop_of: &str, mend: &str| match (declared, actual) {
-            (true, _) => {
-                Some(format!("{loop_of} is unstable on the model as it runs, delay included: {mend}"))
-            }
+        let unstable = |declared: bool, actual: bool, loop_of: &str, remedy: &str| match (declared, actual) {
+            (true, _) => Some(format!("{loop_of} is unstable on the model, including its delay: {remedy}")),
             (false, true) => Some(format!(
-                "{loop_of} is stable on the model but unstable on the robot that is simulated: {mend}"
+                "{loop_of} is stable on the model but unstable on the simulated robot: {remedy}"
             )),
             (false, false) => None,
         };
         match self {
             Self::Ground { controller, given, declared, actual } => {
                 let fails = |robot: &RobotModel| !is_stable(robot, &controller.gain);
-                let mend = if *given {
-                    "leave the gain to the design, or choose another one"
+                let remedy = if *given {
+                    "use the gain of the design, or choose another one"
                 } else {
                     "design it with other weights, or shorten the delay"
                 };
-                unstable(fails(declared), fails(actual), "the balance under this gain", mend)
+                unstable(fails(declared), fails(actual), "the balance loop with this gain", remedy)
             }
             Self::Bench { gains, declared, actual, .. } => {
                 let fails =
@@ -528,7 +537,7 @@ fn speed_control(
     Ok(control)
 }
 
-/// Whether the loop as it runs on a robot is stable: sampled, delayed, with a held IMU.
+/// Returns whether the sampled loop on a robot is stable: sampled, delayed, with a held IMU.
 fn is_stable(robot: &RobotModel, gain: &Matrix2x4<f64>) -> bool {
     lqr::margins(&robot.parameters.linear_model(), gain, &SampledLoop::of(robot)).stable
 }

@@ -6,9 +6,8 @@ use std::ops::ControlFlow;
 use nalgebra::Matrix2x4;
 
 use super::*;
-use crate::identify::Motor;
-use crate::model_file::{Model, Rig, RobotModel, presets};
-use crate::robot::{Actuation, Payload, Surroundings, Tether};
+use crate::model::{Actuation, Model, Motor, Payload, Rig, RobotModel, Surroundings, Tether};
+use crate::model_file::presets;
 
 fn ground(experiment: &Experiment, actual: &Model) -> Run {
     match run(experiment, &presets::paper(), actual, &mut |_| ControlFlow::Continue(())).unwrap() {
@@ -118,7 +117,7 @@ fn multisine_moves_a_smooth_robot_at_its_lines_alone() {
     assert!(turned > 1e-3, "both motors do the same: {turned} rad");
 }
 
-/// Balance of forces and of moments about the axle at rest, whatever the controller.
+/// Balance of forces and of moments about the axle at standstill, whatever the controller.
 #[test]
 fn undeclared_surroundings_lean_the_robot_as_statics_say() {
     let robot = presets::paper().robot().unwrap().clone();
@@ -181,9 +180,9 @@ fn a_gain_that_only_the_declared_robot_bears_is_told() {
     let experiment = Experiment::new(Scenario::Flat, ControllerChoice::Lqr);
     let slow = changed(|robot| robot.actuation.delay_s = 0.2);
     let told = experiment.check(&presets::paper(), &slow).unwrap();
-    assert!(told.len() == 1 && told[0].contains("unstable on the robot that is simulated"), "{told:?}");
+    assert!(told.len() == 1 && told[0].contains("unstable on the simulated robot"), "{told:?}");
     let told = experiment.check(&slow, &slow).unwrap();
-    assert!(told.len() == 1 && told[0].contains("unstable on the model as it runs"), "{told:?}");
+    assert!(told.len() == 1 && told[0].contains("unstable on the model, including its delay"), "{told:?}");
 }
 
 #[test]
@@ -239,11 +238,7 @@ fn what_cannot_run_is_refused_with_its_mend() {
         ),
         (Experiment { target_speed_rad_s: 0.0, ..step.clone() }, &paper, "other than 0"),
         (Experiment { target_speed_rad_s: 3.0, ..sweep }, &paper, "a target speed has no effect"),
-        (
-            Experiment { leg_height_m: Some(0.4), ..step.clone() },
-            &paper,
-            "a height of the legs has no effect",
-        ),
+        (Experiment { leg_height_m: Some(0.4), ..step.clone() }, &paper, "a leg height has no effect"),
         (Experiment { gain: nothing, ..step }, &paper, "a gain has no effect"),
         (
             Experiment { speed_gains: Some(SpeedGains::PAPER), ..flat.clone() },

@@ -3,7 +3,7 @@
 use super::actuator::Actuator;
 use super::noise::Noise;
 use super::simulation::TORQUE_STREAM;
-use crate::robot::{Actuation, MotorLimits};
+use crate::model::{Actuation, MotorLimits};
 
 /// The way of both torques from the controller to the shafts, noise included.
 #[derive(Clone, Debug)]
@@ -22,7 +22,7 @@ impl Motors {
         }
     }
 
-    /// One tick: takes the torques that are asked for and gives those on the shafts, N m, at the motors'
+    /// One tick: takes the torques that are requested and gives those on the shafts, N m, at the motors'
     /// present speeds, rad/s.
     pub(super) fn step(&mut self, asked_nm: [f64; 2], speed_rad_s: [f64; 2]) -> [f64; 2] {
         std::array::from_fn(|motor| {

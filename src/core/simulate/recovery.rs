@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use super::simulation::{FALL_PITCH_RAD, Simulation, SimulationError, SimulationSettings, TICK_S};
 use crate::control::BalanceController;
 use crate::lqr::Disturbance;
-use crate::model_file::RobotModel;
+use crate::model::RobotModel;
 
 /// A robot that has not fallen after this time gets over it, s.
 const LONGEST_S: f64 = 4.0;
@@ -22,12 +22,12 @@ const WATCHED_TICKS: u64 = 50;
 /// Halvings of the range that is searched.
 const BISECTIONS: usize = 10;
 
-/// What came of a disturbance.
+/// Outcome of a disturbance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Recovery {
-    /// Whether the robot is still upright at the end.
+    /// True if the robot is still upright at the end.
     pub upright: bool,
-    /// Largest torque that was asked of either motor, N m, within the controller's limit.
+    /// Largest torque that was required of either motor, N m, within the controller's limit.
     pub peak_torque_nm: f64,
     /// Longest time without a break at that limit, s.
     pub at_limit_s: f64,
@@ -86,6 +86,22 @@ pub fn recovery(
 ///
 /// # Errors
 /// The robot is out of range.
+///
+/// ```
+/// # let model = flqr_core::model_file::presets::paper();
+/// # let robot = model.robot().ok_or("no robot")?;
+/// # let linear = robot.parameters.linear_model();
+/// # let gain = flqr_core::lqr::design(&linear, &robot.weights.ok_or("no weights")?)?.gain;
+/// # use flqr_core::control::{BalanceController, ControllerKind};
+/// use std::ops::ControlFlow;
+///
+/// use flqr_core::simulate::largest_pitch;
+///
+/// let controller = BalanceController::new(ControllerKind::Flqr, robot, gain)?;
+/// let pitch_rad = largest_pitch(robot, &controller, &mut || ControlFlow::Continue(()))?.ok_or("cancelled")?;
+/// assert!((0.1..0.8).contains(&pitch_rad));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn largest_pitch(
     robot: &RobotModel,
     controller: &BalanceController,

@@ -4,9 +4,9 @@ use std::ops::ControlFlow;
 
 use super::*;
 use crate::control::{BalanceController, ControllerKind};
-use crate::lqr::{self, Disturbance, Weights};
-use crate::model_file::{RobotModel, presets};
-use crate::robot::{LinearModel, State};
+use crate::lqr::{self, Disturbance};
+use crate::model::{LinearModel, RobotModel, State, Weights};
+use crate::model_file::presets;
 
 fn robot(torque_nm: f64) -> RobotModel {
     let mut robot = presets::paper().robot().unwrap().clone();

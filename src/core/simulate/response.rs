@@ -2,8 +2,7 @@
 
 use nalgebra::Matrix2x4;
 
-use crate::model_file::RobotModel;
-use crate::robot::State;
+use crate::model::{RobotModel, State};
 
 /// Longest response, so that a slip of the hand does not fill the memory.
 const MAX_STATES: f64 = 1e6;

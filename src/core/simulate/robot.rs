@@ -1,7 +1,6 @@
 //! The robot without its controller: plant, sensors, motors, and what pushes or holds it.
 
 use super::bench_plant::BenchPlant;
-use super::ground::Ground;
 use super::motors::Motors;
 use super::planar::Forcing;
 use super::plant::{Plant, Pose};
@@ -9,12 +8,12 @@ use super::sensors::Sensors;
 use super::simulation::{
     FALL_PITCH_RAD, Fall, NotFinite, SENSOR_STREAM, SimulationError, SimulationSettings, TICK_S,
 };
-use crate::control::Readings;
 use crate::effects::{Machine, RobotLaws};
-use crate::model_file::RobotModel;
-use crate::robot::{Motor, State};
+use crate::model::Ground;
+use crate::model::{Motor, RobotModel, State};
+use crate::record::Readings;
 
-/// A simulated robot, one tick of 1 ms at a time, under whatever torques it is asked for.
+/// A simulated robot, one tick of 1 ms at a time, under whatever torques it is requested.
 #[derive(Clone, Debug)]
 pub struct SimulatedRobot {
     substeps: u32,
@@ -33,7 +32,7 @@ pub struct SimulatedRobot {
 }
 
 impl SimulatedRobot {
-    /// A robot at its initial state, before the first tick, with a ground of its own under the left and the
+    /// A robot at its initial state, before the first tick, with a separate ground under the left and the
     /// right wheel; one that is flat leaves the model's.
     ///
     /// # Errors
@@ -63,7 +62,7 @@ impl SimulatedRobot {
         })
     }
 
-    /// The same with its wheels in the air, its body in a hand: to be moved on by [`SimulatedRobot::hold`].
+    /// Creates it with its wheels in the air, its body held: to be moved on by [`SimulatedRobot::hold`].
     ///
     /// # Errors
     /// Robot or settings out of range.
@@ -79,7 +78,7 @@ impl SimulatedRobot {
         Ok(Self { lifted: Some(shafts), ..on_ground })
     }
 
-    /// What the sensors give at this tick; once a tick, and at every tick.
+    /// Returns the sensor readings of this sample; call exactly once per sample.
     pub fn read(&mut self) -> Readings {
         self.sensors.read(&self.truth(), self.tick)
     }
@@ -94,7 +93,7 @@ impl SimulatedRobot {
         self.sensors.set_imu_rate_hz(rate_hz);
     }
 
-    /// Moves on by one tick under the torques that were asked for a delay earlier, left and right, N m. After
+    /// Moves on by one tick under the torques that were requested a delay earlier, left and right, N m. After
     /// a fall, or where the motion is no longer finite, it stays where it is and so does the clock.
     pub fn advance(&mut self, asked_nm: [f64; 2]) {
         if self.has_ended() {
@@ -172,7 +171,7 @@ impl SimulatedRobot {
         self.torque_nm
     }
 
-    /// Whether friction holds the motor shafts just now; shafts of wheels on the ground.
+    /// Returns whether friction holds the motor shafts just now; shafts of wheels on the ground.
     pub fn stuck(&self) -> [bool; 2] {
         self.plant.stuck()
     }
@@ -182,12 +181,12 @@ impl SimulatedRobot {
         self.fall.as_ref()
     }
 
-    /// Where the motion stopped being finite, if it did.
+    /// Step at which the motion became non-finite, if any.
     pub fn not_finite(&self) -> Option<&NotFinite> {
         self.not_finite.as_ref()
     }
 
-    /// Whether the robot has fallen or its motion is no longer finite.
+    /// Returns whether the robot has fallen or its motion is no longer finite.
     pub fn has_ended(&self) -> bool {
         self.fall.is_some() || self.not_finite.is_some()
     }

@@ -18,15 +18,15 @@ pub enum Scenario {
     Bridge,
     /// As `Flat`, with a kick at 8.5 s (Table 7).
     Kick,
-    /// Wheels in the air, from rest to 5 rad/s under speed control (section 4.3; Figures 6, 7).
+    /// Wheels in the air, from standstill to 5 rad/s under speed control (section 4.3; Figures 6, 7).
     SpeedTracking,
     /// Wheels in the air at 33 constant speeds from −50 to 50 rad/s, for the curve of friction (section 3.1;
-    /// Table 4). See [`SpeedSweep`](crate::identify::excitation::SpeedSweep).
+    /// Table 4). See [`SpeedSweep`](crate::excitation::SpeedSweep).
     FrictionSweep,
     /// Out and back in laps of about 20 s at up to 0.4 m/s, a pace at which the pitch stays within 0.1 rad, to
     /// compare models with a robot that moves. The laps fill the run.
     Cruise,
-    /// Stands upright from rest: noise and friction alone.
+    /// Stands upright from standstill: noise and friction only.
     Station,
     /// Torques of many frequencies, 0.3 to 4.7 Hz, on top of the controller's, other ones left and right: from
     /// where the balance answers them up to where masses and inertias alone do. With `pi` the wheels are in the
@@ -36,9 +36,9 @@ pub enum Scenario {
 
 /// A scenario's name that is not known.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("there is no scenario {name:?}: choose one of {}", Scenario::ALL.map(Scenario::name).join(", "))]
+#[error("unknown scenario {name:?}: choose one of {}", Scenario::ALL.map(Scenario::name).join(", "))]
 pub struct UnknownScenario {
-    /// What was asked for.
+    /// Requested value.
     pub name: String,
 }
 
@@ -86,30 +86,30 @@ impl Scenario {
     /// What it is, in one sentence.
     pub fn description(self) -> &'static str {
         match self {
-            Self::Flat => "Let go 0.05 rad off upright on level ground: does the robot come to rest or hunt?",
+            Self::Flat => "Released at 0.05 rad on level ground: does the robot settle or limit-cycle?",
             Self::Bridge => {
-                "Drives 1 m forward, its left wheel up a ramp onto a deck of 0.04 m, and stands there rolled."
+                "Drives 1 m forward with the left wheel up a ramp onto a 0.04 m high deck, and stands there tilted sideways."
             }
             Self::Kick => "Stands on level ground and is kicked at 8.5 s.",
-            Self::SpeedTracking => "Wheels in the air: from rest to 5 rad/s under PI speed control.",
+            Self::SpeedTracking => "Wheels in the air: from standstill to 5 rad/s with PI speed control.",
             Self::FrictionSweep => {
-                "Wheels in the air: 33 constant speeds from −50 to 50 rad/s, for the curve of friction."
+                "Wheels in the air: 33 constant speeds from −50 to 50 rad/s, for the friction curve."
             }
             Self::Cruise => "Drives out and back in smooth laps.",
-            Self::Station => "Stands upright from rest: noise and friction alone.",
+            Self::Station => "Stands upright from standstill: noise and friction only.",
             Self::Multisine => {
-                "Torques of many frequencies on top of the controller's, to identify masses and inertias from."
+                "Multisine torques added to the controller's, to identify masses and inertias."
             }
         }
     }
 
-    /// Whether the robot stands on the ground; otherwise its wheels are in the air. A multisine under `pi` has
+    /// Returns whether the robot stands on the ground; otherwise its wheels are in the air. A multisine under `pi` has
     /// them in the air as well.
     pub fn on_ground(self) -> bool {
         !matches!(self, Self::SpeedTracking | Self::FrictionSweep)
     }
 
-    /// Duration where none is asked for, s: a minute; two for the sweep, whose means over each speed are so
+    /// Duration where none is requested, s: a minute; two for the sweep, whose means over each speed are so
     /// much the better.
     pub fn default_seconds(self) -> f64 {
         if self == Self::FrictionSweep { 120.0 } else { 60.0 }

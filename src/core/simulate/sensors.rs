@@ -1,11 +1,11 @@
-//! What the robot knows of itself: encoders, motor speeds and IMU, each at its own rate.
+//! Sensors of the robot: encoders, motor speeds and IMU, each at its own rate.
 
 use std::collections::VecDeque;
 
 use super::noise::Noise;
 use super::simulation::TICK_S;
-use crate::control::Readings;
-use crate::robot::SensorSettings;
+use crate::model::SensorSettings;
+use crate::record::Readings;
 
 /// Step of a recorder's time stamps, s.
 const STAMP_STEP_S: f64 = 1e-6;

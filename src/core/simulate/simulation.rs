@@ -1,15 +1,14 @@
 //! The closed loop: a robot and its controller.
 
-use super::ground::Ground;
 use super::plant::Pose;
 use super::robot::SimulatedRobot;
 use crate::ParameterError;
 use crate::control::{BalanceController, Measurement, Reference};
-use crate::model_file::RobotModel;
+use crate::model::Ground;
+pub use crate::model::TICK_S;
+use crate::model::{RobotModel, State};
 use crate::parameter::{finite, within};
 use crate::record::Sample;
-use crate::robot::State;
-pub use crate::robot::TICK_S;
 
 /// Pitch beyond which the robot has fallen, rad.
 pub const FALL_PITCH_RAD: f64 = 0.8;
@@ -17,7 +16,7 @@ pub const FALL_PITCH_RAD: f64 = 0.8;
 pub(super) const TORQUE_STREAM: u64 = 0;
 pub(super) const SENSOR_STREAM: u64 = 2;
 
-/// How a robot is simulated. Its sensors, delays and noises are the model's.
+/// Settings of a simulation. Sensors, delays and noise are the model's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SimulationSettings {
     /// Seed of all noise.
@@ -40,7 +39,7 @@ impl Default for SimulationSettings {
 #[error("the simulation cannot start: {0}")]
 pub struct SimulationError(#[from] ParameterError);
 
-/// Where and when the robot fell.
+/// State and time of a fall.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fall {
     /// Time, s.
@@ -49,11 +48,11 @@ pub struct Fall {
     pub state: State,
 }
 
-/// Where a motion stopped being one.
+/// Step at which the motion became non-finite.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
-    "the motion is not finite from step {step} ({time_s} s) on: look for extreme masses, lengths, friction or \
-     stiffnesses in the model"
+    "the motion is not finite from step {step} ({time_s} s): check the model for extreme masses, lengths, \
+     friction or stiffnesses"
 )]
 pub struct NotFinite {
     /// Tick of 1 ms, counted from 1, during which it happened.
@@ -62,10 +61,10 @@ pub struct NotFinite {
     pub time_s: f64,
 }
 
-/// What is asked of the robot at one tick.
+/// Setpoint of the robot at one sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Command {
-    /// Where it is to be.
+    /// Position setpoint.
     pub reference: Reference,
     /// Torque on top of the controller's, left and right, N m; excites motions to identify from.
     pub added_torque_nm: [f64; 2],
@@ -92,7 +91,7 @@ impl Simulation {
         Self::on_ground(robot, controller, settings, &[const { Ground::flat() }; 2])
     }
 
-    /// The same with a ground of its own under the left and the right wheel.
+    /// Creates it with separate ground under the left and the right wheel.
     ///
     /// # Errors
     /// Robot, settings or ground out of range.
@@ -106,11 +105,31 @@ impl Simulation {
     }
 
     /// One tick of keeping the station x = 0; see [`Simulation::step_to`].
+    ///
+    /// ```
+    /// # let model = flqr_core::model_file::presets::paper();
+    /// # let robot = model.robot().ok_or("no robot")?;
+    /// # let linear = robot.parameters.linear_model();
+    /// # let gain = flqr_core::lqr::design(&linear, &robot.weights.ok_or("no weights")?)?.gain;
+    /// # use flqr_core::control::{BalanceController, ControllerKind};
+    /// use flqr_core::model::State;
+    /// use flqr_core::simulate::{Simulation, SimulationSettings};
+    ///
+    /// let controller = BalanceController::new(ControllerKind::Flqr, robot, gain)?;
+    /// let initial = State { pitch_rad: 0.1, ..State::default() };
+    /// let settings = SimulationSettings { initial, ..SimulationSettings::default() };
+    /// let mut simulation = Simulation::new(robot, controller, settings)?;
+    /// for _ in 0..3000 {
+    ///     simulation.step();
+    /// }
+    /// assert!(simulation.state().pitch_rad.abs() < 0.02 && simulation.fall().is_none());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn step(&mut self) -> Sample {
         self.step_to(&Command::default())
     }
 
-    /// One tick: read the sensors, ask the controller, move on by 1 ms under the torques that were asked for
+    /// One tick: read the sensors, ask the controller, move on by 1 ms under the torques that were requested
     /// a delay earlier. After a fall, or where the motion is no longer finite, the motors are off, the robot
     /// stays where it is and so does the clock.
     pub fn step_to(&mut self, command: &Command) -> Sample {
@@ -152,7 +171,7 @@ impl Simulation {
         self.robot.motor_angle_rad()
     }
 
-    /// Whether friction holds the motor shafts just now.
+    /// Returns whether friction holds the motor shafts just now.
     pub fn stuck(&self) -> [bool; 2] {
         self.robot.stuck()
     }
@@ -162,12 +181,12 @@ impl Simulation {
         self.robot.fall()
     }
 
-    /// Where the motion stopped being finite, if it did.
+    /// Step at which the motion became non-finite, if any.
     pub fn not_finite(&self) -> Option<&NotFinite> {
         self.robot.not_finite()
     }
 
-    /// Whether the robot has fallen or its motion is no longer finite.
+    /// Returns whether the robot has fallen or its motion is no longer finite.
     pub fn has_ended(&self) -> bool {
         self.robot.has_ended()
     }

@@ -40,10 +40,10 @@ pub struct Statistics {
     pub x_dot_m_s: Summary,
     /// Pitch, rad.
     pub pitch_rad: Summary,
-    /// Whether x stayed within 0.05 m peak to peak over the last 10 s. A run that fell or is shorter than
+    /// True if x stayed within 0.05 m peak to peak over the last 10 s. A run that fell or is shorter than
     /// 10 s has not settled.
     pub settled: bool,
-    /// Whether the pitch passed 0.8 rad either way.
+    /// True if the pitch passed 0.8 rad either way.
     pub fell: bool,
 }
 
@@ -56,8 +56,19 @@ impl Statistics {
         Self::between(samples, [from_s, end_s])
     }
 
-    /// The same of the samples from one time to another, both included; none without samples between them.
+    /// Statistics of the samples between two times, inclusive; `None` without samples between them.
     /// Whether the robot settled or fell is said of the whole run.
+    ///
+    /// ```
+    /// use flqr_core::record::Sample;
+    /// use flqr_core::simulate::Statistics;
+    ///
+    /// let row = |i: u32| Sample::from_row([f64::from(i), f64::from(i % 2), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    /// let samples: Vec<Sample> = (0..10).map(row).collect();
+    /// let statistics = Statistics::between(&samples, [0.0, 9.0]).ok_or("no samples")?;
+    /// assert_eq!((statistics.x_m.min, statistics.x_m.max, statistics.x_m.mean), (0.0, 1.0, 0.5));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn between(samples: &[Sample], range_s: [f64; 2]) -> Option<Self> {
         let end_s = samples.last()?.time_s;
         let after = |from_s: f64| &samples[samples.partition_point(|sample| sample.time_s < from_s)..];
@@ -81,7 +92,7 @@ impl Statistics {
     }
 }
 
-/// The samples from one time to another, both included; none where the times are in no order.
+/// The samples from one time to another, both included; `None` if the times are in no order.
 pub(super) fn between<T>(samples: &[T], time_s: impl Fn(&T) -> f64, [from_s, to_s]: [f64; 2]) -> &[T] {
     if from_s.partial_cmp(&to_s).is_none_or(Ordering::is_gt) {
         return &[];

@@ -6,11 +6,10 @@ use nalgebra::Matrix2x4;
 
 use super::*;
 use crate::control::{BalanceController, ControllerKind};
-use crate::identify::Motor;
 use crate::lqr;
-use crate::model_file::{Model, RobotModel, presets};
+use crate::model::{Actuation, Model, Motor, RobotModel, SensorSettings, State, YawHold};
+use crate::model_file::presets;
 use crate::record::Sample;
-use crate::robot::{Actuation, SensorSettings, State, YawHold};
 
 fn paper() -> RobotModel {
     presets::paper().robot().unwrap().clone()

@@ -1,8 +1,8 @@
-//! How a motor follows a step of its target speed (Figures 6, 7).
+//! Step response of the motor speed (Figures 6, 7).
 
 use serde::Serialize;
 
-use crate::identify::excitation::Step;
+use crate::excitation::Step;
 use crate::record::BenchSample;
 
 /// Length of the end of a run over which the steady error is averaged, s; a tenth of shorter runs.
@@ -12,7 +12,7 @@ const STEADY_S: f64 = 1.0;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct StepResponse {
     /// From the first time at 10 % of the step to the first time at 90 %, s, between samples along a straight
-    /// line; none where the speed never gets there.
+    /// line; `None` if the speed never gets there.
     pub rise_time_s: Option<f64>,
     /// Farthest measured speed beyond the target, rad/s; sensor noise included.
     pub overshoot_rad_s: f64,

@@ -3,30 +3,35 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
+mod faulty_bus;
+
 use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use flqr_core::control::drive::{
-    CheckResult, Drive, DriveEvent, DriveOrder, DriveSettings, Excitation, Inputs, Stage, StopReason,
+use faulty_bus::{FaultRates, Faulty};
+use flqr_core::control::{
+    BalanceController, ControllerKind,
+    drive::{
+        CheckResult, Drive, DriveEvent, DriveOrder, DriveSettings, Excitation, Inputs, Stage, StopReason,
+    },
 };
-use flqr_core::control::{BalanceController, ControllerKind};
-use flqr_core::link::jy901::Decoder;
+use flqr_core::emulator::{EmulatedBus, Emulator, EmulatorSettings, Fault};
 use flqr_core::link::{
-    Bus, Direction, EmulatedBus, Emulator, EmulatorSettings, Fault, FaultRates, Faulty, ImuAssembler,
-    ImuReading, MotorErrors, MotorEvent, MotorOrder, StampedFrame, Wheels,
+    Bus, Direction, ImuAssembler, ImuReading, MotorErrors, MotorEvent, MotorOrder, StampedFrame, Wheels,
+    jy901::Decoder,
 };
 use flqr_core::lqr;
-use flqr_core::model_file::{RobotModel, presets};
-use flqr_core::record::recording::{
-    About, FrameLog, Row, push_event, push_frame, push_imu_packet, push_row, robot_header,
+use flqr_core::model::{Motor, RobotModel};
+use flqr_core::model_file::presets;
+use flqr_core::record::{
+    ColumnMap, ReadOptions, read_log,
+    recording::{About, FrameLog, Row, push_event, push_frame, push_imu_packet, push_row, robot_header},
 };
-use flqr_core::record::{ColumnMap, ReadOptions, read_log};
-use flqr_core::robot::Motor;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Shares of the frames each way that are lost, doubled and overtaken.
+/// Fractions of the frames each way that are lost, doubled and overtaken.
 const ROUGH: FaultRates = FaultRates {
     loss: 0.01,
     duplication: 0.01,
@@ -36,7 +41,7 @@ const ROUGH: FaultRates = FaultRates {
     stall_for: Duration::from_millis(50),
     delay: Duration::ZERO,
 };
-/// Share of the IMU's bytes that are damaged.
+/// Fraction of the IMU's bytes that are damaged.
 const DAMAGED_BYTES: f64 = 0.001;
 const START: Duration = Duration::from_secs(1_700_000_000);
 
@@ -51,11 +56,11 @@ struct Host {
     random: ChaCha8Rng,
     tick: u64,
     stop: Option<(u64, StopReason)>,
-    /// Ticks after a stop at which a torque was asked for.
+    /// Ticks after a stop at which a torque was requested.
     torques_after_stop: u64,
     rows: String,
     frames: String,
-    /// Frames heard, rows, frames sent, and those that a bus that is off did not take.
+    /// Frames received, rows, frames sent, and those that a bus that is off did not take.
     counts: [u64; 4],
     packets: u64,
 }
@@ -205,13 +210,13 @@ impl Host {
 /// what the sensor or the queries need to show it.
 struct Case {
     fault: Fault,
-    mend: Option<Fault>,
+    remedy: Option<Fault>,
     stop: &'static str,
     within_ms: u64,
 }
 
 fn cases() -> Vec<Case> {
-    let case = |fault, mend, stop, within_ms| Case { fault, mend, stop, within_ms };
+    let case = |fault, remedy, stop, within_ms| Case { fault, remedy, stop, within_ms };
     use Motor::{Left, Right};
     vec![
         case(Fault::MotorVanishes(Left), Some(Fault::MotorReturns(Left)), "motor_silent", 20 + 3),
@@ -256,8 +261,8 @@ fn ten_minutes_of_faults_end_in_named_stops_without_torque_and_are_recorded_whol
         }
         host.run(300);
         host.bus.set_rates(FaultRates::default());
-        if let Some(mend) = case.mend {
-            host.inject(mend);
+        if let Some(remedy) = case.remedy {
+            host.inject(remedy);
         }
         host.send(&MotorOrder::ClearErrors);
         host.run(300);

@@ -125,16 +125,13 @@ fn nothing_is_overwritten_and_nothing_half_made_is_left() {
     let message = Recorder::start(&name, &about(), true).unwrap_err().to_string();
     assert_eq!(
         message,
-        format!(
-            "{} is there already and is not overwritten: give another name or move it away",
-            taken.display()
-        )
+        format!("{} exists and is not overwritten: give another name or move it away", taken.display())
     );
     assert_eq!(fs::read_to_string(&taken).unwrap(), "mine");
     assert_eq!(fs::read_dir(&folder).unwrap().count(), 1);
     let error = Recorder::start(&folder.join("none/run"), &about(), false).unwrap_err();
     assert!(matches!(error, RecorderError::NoFolder { .. }), "{error}");
-    assert!(error.to_string().contains("/none is not there: make it or give another name"), "{error}");
+    assert!(error.to_string().contains("/none does not exist: create it or give another name"), "{error}");
 }
 
 /// Name of the recording that the child makes.

@@ -9,13 +9,13 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, LazyLock};
 use std::time::Duration;
 
-use flqr_core::control::drive::Excitation;
-use flqr_core::control::{BalanceController, ControllerKind};
+use flqr_core::control::{BalanceController, ControllerKind, drive::Excitation};
 use flqr_core::device::{
     Connection, Described, EventKind, SerialAddress, Session, SessionMode, SessionOptions, SessionOrder,
     Source, Update,
 };
-use flqr_core::model_file::{RobotModel, presets};
+use flqr_core::model::RobotModel;
+use flqr_core::model_file::presets;
 use flqr_core::record::{ColumnMap, ReadOptions, Sample, read_log};
 
 /// How much is recorded.
@@ -69,7 +69,7 @@ fn csv() -> PathBuf {
     RECORDED.0.with_extension("csv")
 }
 
-/// The raw frames, without a robot log beside them.
+/// The raw frames, without a robot log next to them.
 fn frames_alone(name: &str) -> PathBuf {
     let alone = folder(name).join("alone.log");
     fs::copy(RECORDED.0.with_extension("log"), &alone).unwrap();
@@ -127,11 +127,8 @@ fn a_replay_gives_the_samples_that_were_recorded_and_shown_at_any_speed() {
         assert!(updates.iter().any(|update| !update.frames.is_empty()));
         assert!(last.status.motors.iter().all(|motor| motor.rate_hz > 500.0), "{:?}", last.status);
         assert!(last.status.imu.rate_hz > 50.0, "{:?}", last.status);
-        let end = format!(
-            "the recording has come to its end: {} rows and {} frames",
-            recorded.len(),
-            frames.lines().count()
-        );
+        let end =
+            format!("end of the recording: {} rows and {} frames", recorded.len(), frames.lines().count());
         assert_eq!(texts(&updates, EventKind::Note).last(), Some(&end.as_str()));
         assert!(texts(&updates, EventKind::Warning).is_empty());
     }
@@ -161,7 +158,7 @@ fn frames_alone_are_decoded_as_live_ones_were_and_alike_at_any_speed() {
     assert!((x_m - x_again_m).abs() < 1e-3, "{x_m} m {x_again_m} m");
     assert!((torque_nm - torque_again_nm).abs() < 0.5, "{torque_nm} N m {torque_again_nm} N m");
     let beside = samples(&play(replay(&csv().with_extension("log"), f64::INFINITY)));
-    // With the robot log beside them, they have its times.
+    // With the robot log next to them, they have its times.
     assert!((beside[0].time_s - recorded[0].time_s).abs() < 0.005, "{} s", beside[0].time_s);
     assert_eq!(readings(&beside), again);
 }
@@ -176,7 +173,10 @@ fn a_torn_last_row_is_told_and_all_before_it_are_played() {
     let recorded = rows(&csv());
     assert_eq!(samples(&updates), &recorded[..recorded.len() - 1]);
     let [warning] = texts(&updates, EventKind::Warning)[..] else { panic!("one warning") };
-    assert!(warning.contains("torn.csv: line ") && warning.contains("cut off"), "{warning}");
+    assert!(
+        warning.contains("torn.csv: line ") && warning.contains("ends in the middle of this row"),
+        "{warning}"
+    );
     assert_eq!(updates.last().unwrap().status.counters.errors, 1);
 }
 
@@ -238,8 +238,8 @@ fn what_cannot_be_replayed_is_named_with_the_mend() {
     fs::write(&bench, "time_s,motor_angle_rad,torque_nm\n0,1,2\n").unwrap();
     for (file, expected) in [
         (folder.join("none.csv"), "none.csv: there is no such file: check the path"),
-        (folder.clone(), "replay-refused: this is a folder: give a file in it"),
-        (bench, "bench.csv is no robot log, it has no `x_m`"),
+        (folder.clone(), "replay-refused: this is a folder: give a file"),
+        (bench, "bench.csv is not a robot log, because it has no `x_m`"),
     ] {
         let error = Session::open(replay(&file, 1.0), Arc::new(|| {})).err().unwrap().to_string();
         assert!(error.contains(expected), "{error}");
@@ -251,7 +251,7 @@ fn what_cannot_be_replayed_is_named_with_the_mend() {
     let mode = SessionMode::Drive { controller: Box::new(controller), excitation: Excitation::Balance };
     let driven = SessionOptions { mode, ..replay(&csv(), 1.0) };
     let error = Session::open(driven, Arc::new(|| {})).err().unwrap().to_string();
-    assert!(error.starts_with("a recording can be watched but not driven: give can:INTERFACE"), "{error}");
+    assert!(error.starts_with("a recording can be monitored but not driven: give can:INTERFACE"), "{error}");
 }
 
 /// Its degrees are written in Latin-1, as tools of Windows do.
@@ -324,7 +324,7 @@ fn what_a_dbc_file_cannot_serve_for_is_named_with_the_mend() {
     for (signals, expected) in [
         (
             &SIGNALS[..3],
-            "no signal is chosen for the motion of the right motor: add motor_speed_right_rad_s=SIGNAL",
+            "no signal is selected for the motion of the right motor: add motor_speed_right_rad_s=SIGNAL",
         ),
         (
             &["pitch=Nothing"][..],

@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 use egui::{Context, Theme};
 use flqr_core::control::gate::Verdict;
 use flqr_core::device::{SessionOptions, Source as DeviceSource};
-use flqr_core::model_file::{Model, Rig, presets};
+use flqr_core::model::{Model, Rig};
+use flqr_core::model_file::{RenamedKey, presets, renamed_keys};
 
-use super::keep::{self, absolute};
+use super::persistence::{self, absolute};
 use super::questions::{Question, Replacement};
 use super::{App, ModelJob};
 use crate::command::{Command, FilePurpose, Source, Target};
@@ -16,6 +17,7 @@ use crate::commands::Palette;
 use crate::dialog::{Dialog, missing_portal};
 use crate::document::Base;
 use crate::friction::Fitted;
+use crate::help::Help;
 use crate::job::{Job, Outcome, Reporter};
 use crate::layout::Layout;
 use crate::live::LiveCommand;
@@ -35,7 +37,7 @@ const HIDDEN_INTERVAL: std::time::Duration = std::time::Duration::from_millis(20
 /// Smallest and largest size of everything.
 const ZOOMS: [f32; 2] = [0.5, 3.0];
 
-/// What to do with a chosen file.
+/// Action for a selected file.
 pub(super) fn chosen(purpose: FilePurpose, path: PathBuf) -> Command {
     match purpose {
         FilePurpose::OpenModel => Command::LoadModel(path),
@@ -49,7 +51,7 @@ pub(super) fn chosen(purpose: FilePurpose, path: PathBuf) -> Command {
         FilePurpose::OpenSession => Command::OpenSession(path),
         // As with a model: the dialog has asked about the name as it was typed.
         FilePurpose::SaveSession => {
-            let replace = keep::with_ending(path.clone()) == path;
+            let replace = persistence::with_ending(path.clone()) == path;
             Command::SaveSession { path, replace }
         }
         // The dialog knows one name as it was typed; what is written may have another or several.
@@ -77,7 +79,7 @@ impl App {
             }
             Command::ResetLayout => {
                 self.layout = Layout::new(self.tab);
-                self.say("All pages are in one tile again.");
+                self.say("All pages are in one tile.");
             }
             Command::SetDark(dark) => ctx.set_theme(if dark { Theme::Dark } else { Theme::Light }),
             Command::SetZoom(zoom) => ctx.set_zoom_factor(zoom.clamp(ZOOMS[0], ZOOMS[1])),
@@ -94,6 +96,10 @@ impl App {
                 self.tour = Some(Tour::default());
                 self.commands.send(Command::SelectTab(Tab::Tune));
             }
+            Command::ShowManual => match &mut self.help {
+                Some(help) => help.show(self.tab),
+                None => self.help = Some(Help::open(self.tab)),
+            },
             Command::CopyLine => self.copy_line(self.command_line(), ctx),
             Command::CopyLineOf(run) => self.copy_line(self.runs.command_of(run), ctx),
             Command::AskFile(purpose) => self.ask_file(purpose),
@@ -161,7 +167,7 @@ impl App {
             Command::ShowDialog(purpose) => self.show_dialog(purpose),
             Command::LoadPreset(number) => self.ask_preset(number),
             Command::TakePreset(number) => self.load_preset(number),
-            // Who opens a log where a model is asked for means the log.
+            // Who opens a log where a model is requested means the log.
             Command::LoadModel(path) if path.extension().is_some_and(|ending| ending == "csv") => {
                 self.commands.send(Command::LoadLog(path));
                 self.commands.send(Command::SelectTab(Tab::Friction));
@@ -250,7 +256,7 @@ impl App {
 
     fn connect(&mut self) {
         if self.link.is_open() || self.link.is_opening() {
-            return self.fail("A robot is connected already: disconnect it first.");
+            return self.fail("A robot is already connected. Disconnect it first.");
         }
         let options = match self.robot.form.options(self.source, &self.session, &self.designer) {
             Ok(options) => options,
@@ -289,18 +295,18 @@ impl App {
     fn apply_gains(&mut self) {
         let verdict = self.link.transfer.pending().map(|pending| pending.verdict.clone());
         match verdict {
-            None => self.say("The robot runs the gains of the design already."),
+            None => self.say("The robot already uses the gains of the design."),
             Some(Verdict::Accept) => self.confirm_gains(),
             Some(Verdict::Ask(changes)) => self.ask(Question::Gains { changes }),
             Some(Verdict::Refuse(refusal)) => {
-                self.fail(format!("Not applied, the previous gains stay: {refusal}."));
+                self.fail(format!("Not applied, the previous gains remain active: {refusal}."));
             }
         }
     }
 
     fn confirm_gains(&mut self) {
         if self.link.apply_design() {
-            self.say("New gains applied: they fade in over 0.2 s.");
+            self.say("New gains applied, blended over 0.2 s.");
         }
     }
 
@@ -309,7 +315,7 @@ impl App {
             return;
         }
         if self.link.is_hot() {
-            return self.fail("The robot may move: stop it before choosing another source.");
+            return self.fail("The robot may move. Stop it before you change the source.");
         }
         self.link.close(&self.waker);
         self.link.forget();
@@ -335,7 +341,7 @@ impl App {
         if let Some(robot) = self.session.robot_mut() {
             robot.weights = Some(reference.weights);
         }
-        self.say(format!("The weights of {} are in force.", self.designer.active.other().name()));
+        self.say(format!("The weights of {} are active.", self.designer.active.other().name()));
     }
 
     fn swap_reference(&mut self) {
@@ -343,7 +349,7 @@ impl App {
         if let Some(robot) = self.session.robot_mut() {
             robot.weights = Some(weights);
         }
-        self.say(format!("{} is in force.", self.designer.active.name()));
+        self.say(format!("{} is active.", self.designer.active.name()));
     }
 
     fn reset_weights(&mut self) {
@@ -351,7 +357,7 @@ impl App {
         if let Some(robot) = self.session.robot_mut() {
             robot.weights = weights;
         }
-        self.say("The weights are those of the loaded model again.");
+        self.say("The weights were reset to the loaded model.");
     }
 
     fn copy_line(&mut self, line: Result<String, String>, ctx: &Context) {
@@ -393,7 +399,7 @@ impl App {
 
     fn show_dialog(&mut self, purpose: FilePurpose) {
         if self.dialog.is_some() {
-            self.say("A file dialog is open already.");
+            self.say("A file dialog is already open.");
             return;
         }
         let name = self.model_path.as_deref().and_then(Path::file_name);
@@ -407,7 +413,7 @@ impl App {
         };
         match Dialog::open(purpose, suggestion, &self.waker) {
             Ok(dialog) => self.dialog = Some(dialog),
-            Err(error) => self.fail(format!("No thread for a file dialog: {error}.")),
+            Err(error) => self.fail(format!("Cannot open a file dialog: {error}.")),
         }
     }
 
@@ -425,7 +431,7 @@ impl App {
     /// Says whether the model was taken.
     pub(super) fn open_model(&mut self, model: Model, path: Option<PathBuf>) -> bool {
         if self.link.is_hot() {
-            self.fail("The robot may move: stop it before loading another model.");
+            self.fail("The robot may move. Stop it before you load another model.");
             return false;
         }
         // A robot is driven by the model that it was connected with, or not at all.
@@ -456,7 +462,7 @@ impl App {
     fn model_file_is_busy(&mut self) -> bool {
         let busy = self.model_job.is_some();
         if busy {
-            self.fail("A model file is still being read or written: try again when that has ended.");
+            self.fail("A model file is still being read or written. Try again when it is finished.");
         }
         busy
     }
@@ -468,7 +474,7 @@ impl App {
         let file = path.clone();
         match Job::start("load-model", &self.waker, move |_| read_model(&file)) {
             Ok(job) => self.model_job = Some(ModelJob::Load(path, job)),
-            Err(error) => self.fail(format!("No thread to load the model: {error}.")),
+            Err(error) => self.fail(format!("Cannot start loading the model: {error}.")),
         }
     }
 
@@ -493,7 +499,7 @@ impl App {
             Ok(job) => self.model_job = Some(ModelJob::Save(path, self.session.clone(), job)),
             Err(error) => {
                 self.leave_after_save = false;
-                self.fail(format!("No thread to save the model: {error}."));
+                self.fail(format!("Cannot start saving the model: {error}."));
             }
         }
     }
@@ -503,24 +509,28 @@ impl App {
             None => {}
             Some(ModelJob::Load(path, mut job)) => match job.poll().1 {
                 Outcome::Running => self.model_job = Some(ModelJob::Load(path, job)),
-                Outcome::Done(Ok(model))
-                    if self.session != self.saved && model != self.session.model() && !self.link.is_hot() =>
-                {
-                    self.ask_replacement(Replacement::Model(Box::new(model), path));
+                Outcome::Done(Ok((model, renamed))) => {
+                    if self.session != self.saved && model != self.session.model() && !self.link.is_hot() {
+                        self.ask_replacement(Replacement::Model(Box::new(model), path));
+                    } else {
+                        self.open_model(model, Some(path));
+                    }
+                    for key in renamed {
+                        self.messages.add(Severity::Note, key.to_string());
+                    }
                 }
-                Outcome::Done(Ok(model)) => drop(self.open_model(model, Some(path))),
                 Outcome::Done(Err(problem)) => {
                     self.tune.note_file_problem(&problem);
                     self.fail(problem);
                 }
-                Outcome::Broken => self.fail("Loading the model failed: this is a defect of flqr."),
+                Outcome::Broken => self.fail("Loading the model failed: this is an internal error."),
             },
             Some(ModelJob::Save(path, session, mut job)) => match job.poll().1 {
                 Outcome::Running => self.model_job = Some(ModelJob::Save(path, session, job)),
                 Outcome::Done(Ok(Saved::Written)) => self.note_saved(path, session),
                 Outcome::Done(Ok(Saved::AnotherIsThere)) => {
                     self.leave_after_save = false;
-                    self.say(format!("{} exists and was not replaced.", path.display()));
+                    self.say(format!("{} exists and was not overwritten.", path.display()));
                     let save = Command::OverwriteModel(path.clone());
                     self.ask(Question::Overwrite { path, what: "model", save });
                 }
@@ -531,7 +541,7 @@ impl App {
                 }
                 Outcome::Broken => {
                     self.leave_after_save = false;
-                    self.fail("Saving the model failed: this is a defect of flqr.");
+                    self.fail("Saving the model failed: this is an internal error.");
                 }
             },
         }
@@ -572,7 +582,7 @@ impl App {
     }
 
     fn use_fit(&mut self, target: Target) {
-        self.undo.call("use of the fit");
+        self.undo.call("use fit in model");
         let put = |fitted: Fitted| fitted.put_into(&mut self.session.rig, target);
         match self.friction.fitted().and_then(put) {
             Ok(done) => self.say(done),
@@ -591,7 +601,7 @@ impl App {
             Err(problem) => return self.fail(problem),
         };
         if self.session != before {
-            self.undo.call("use of what the search found");
+            self.undo.call("use effects in model");
         }
         if let Some(said) = done.said {
             self.say(said);
@@ -648,16 +658,18 @@ impl App {
     }
 }
 
-fn read_model(path: &Path) -> Result<Model, String> {
+/// Reads a model file; the keys that have been renamed come along.
+fn read_model(path: &Path) -> Result<(Model, Vec<RenamedKey>), String> {
     let problem =
         |error: std::io::Error| format!("{} could not be opened: {error}; check the path", path.display());
     let size = std::fs::metadata(path).map_err(problem)?.len();
     if size > LARGEST_MODEL_BYTES {
         return Err(format!(
-            "{} is no model file: it has {size} bytes, at most {LARGEST_MODEL_BYTES} are read; choose a TOML file",
+            "{} is not a model file: it has {size} bytes, more than the limit of {LARGEST_MODEL_BYTES}; choose a TOML file",
             path.display()
         ));
     }
     let text = std::fs::read_to_string(path).map_err(problem)?;
-    Model::from_toml(&text, &path.display().to_string()).map_err(|error| error.to_string())
+    let model = Model::from_toml(&text, &path.display().to_string()).map_err(|error| error.to_string())?;
+    Ok((model, renamed_keys(&text)))
 }

@@ -1,4 +1,4 @@
-//! What is asked before something is lost or replaced.
+//! Confirmations before data are lost or overwritten.
 
 use std::path::{Path, PathBuf};
 
@@ -8,7 +8,8 @@ use egui::{
     TextStyle, Ui, vec2,
 };
 use flqr_core::control::gate::{GainChange, LARGEST_FACTOR};
-use flqr_core::model_file::{Change, Model, presets};
+use flqr_core::model::Model;
+use flqr_core::model_file::{Change, presets};
 
 use super::{App, apply};
 use crate::command::{Command, FilePurpose};
@@ -33,30 +34,30 @@ pub(super) enum Question {
     Preset { number: usize, name: &'static str, changes: Vec<Change> },
     /// A window was not closed.
     Restore { left: Left, document: Box<Document>, whole: bool },
-    /// What was read is to replace a model with changes.
+    /// Replace a modified model.
     Replace { by: Replacement, changes: Vec<Change> },
-    /// What is to be saved where another file is, and how.
+    /// Command that overwrites a file.
     Overwrite { path: PathBuf, what: &'static str, save: Command },
     /// A path is wanted; why there is no dialog for it.
     Path { purpose: FilePurpose, text: String, reason: Option<String>, has_focus: bool },
-    /// What can be undone.
+    /// Undoable steps.
     Steps,
 }
 
-/// What is to replace the model, and its file.
+/// New model and its file.
 pub(super) enum Replacement {
     Model(Box<Model>, PathBuf),
     Session(Box<Document>, PathBuf),
 }
 
-/// What a question has come to in a frame.
+/// Outcome of a question in a frame.
 struct Reply {
     answer: Answer,
     /// Name of the answer that has the keyboard's focus.
     focus: Option<&'static str>,
 }
 
-/// What an answer asks for.
+/// Action of an answer.
 enum Answer {
     Open,
     Close,
@@ -86,7 +87,7 @@ fn preset(number: usize) -> Option<Result<Model, String>> {
 }
 
 impl Question {
-    /// Whether it is put already by `other`.
+    /// Returns whether it is put already by `other`.
     fn is_same(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Leave, Self::Leave) | (Self::LeaveDriven, Self::LeaveDriven) => true,
@@ -232,14 +233,14 @@ impl App {
                     } else if whole {
                         self.take_over(left);
                     } else {
-                        self.say(format!("What was kept stays in {}.", left.put_aside().display()));
+                        self.say(format!("The saved session remains in {}.", left.put_aside().display()));
                     }
                 }
             }
             Answer::StartAfresh => {
                 self.messages.release();
                 if let Question::Restore { left, .. } = question {
-                    self.say(format!("The session of before stays in {}.", left.put_aside().display()));
+                    self.say(format!("The previous session remains in {}.", left.put_aside().display()));
                 }
             }
             Answer::Replace => {
@@ -279,14 +280,14 @@ impl App {
 
     fn leave_ui(&self, ui: &mut Ui) -> Reply {
         ui.heading("Save the model?");
-        ui.label(format!("“{}” has changes that are in no file.", self.session.name));
+        ui.label(format!("“{}” has unsaved changes.", self.session.name));
         changes_ui(&self.saved.model().changes_to(&self.session.model()), ["saved", "now"], ui);
         answers_ui(
             ui,
             [
-                (Key::S, "Save and close", "Save the model, then close the window", Answer::SaveAndLeave),
-                (Key::D, "Discard and close", "Close the window; the changes are lost", Answer::Discard),
-                (Key::C, "Cancel", "Go on", Answer::Close),
+                (Key::S, "Save and close", "Save the model and close the window", Answer::SaveAndLeave),
+                (Key::D, "Discard and close", "Close the window and lose the changes", Answer::Discard),
+                (Key::C, "Cancel", "Continue", Answer::Close),
             ],
         )
     }
@@ -297,7 +298,7 @@ impl App {
         let mut losses = Vec::new();
         let is_other = by.model().is_some_and(|model| *model != self.session.model());
         if is_other && self.session != self.saved {
-            losses.push(format!("“{}” has changes that are in no file.", self.session.name));
+            losses.push(format!("“{}” has unsaved changes.", self.session.name));
         }
         let runs = match by {
             Replacement::Session(document, _) => document.runs.as_ref(),
@@ -305,18 +306,21 @@ impl App {
         };
         let missing = runs.map_or(0, |runs| self.runs.ledger().missing_in(runs));
         if missing > 0 {
-            losses.push(format!("{} of the Runs page that the file has not go too.", listed(missing, "row")));
+            losses.push(format!(
+                "{} of the Runs page that are not in the file are removed too.",
+                listed(missing, "row")
+            ));
         }
         if !changes.is_empty() {
             losses.push(format!("{} of the model change.", listed(changes.len(), "value")));
         }
-        ui.label(format!("{} Undo brings all of now back.", losses.join(" ")));
+        ui.label(format!("{} Undo restores the current state.", losses.join(" ")));
         changes_ui(changes, ["now", "then"], ui);
         answers_ui(
             ui,
             [
-                (Key::R, "Replace it", "Open the file in place of what there is now", Answer::Replace),
-                (Key::K, "Keep it", "Leave all as it is", Answer::Close),
+                (Key::R, "Replace it", "Open the file and replace the current session", Answer::Replace),
+                (Key::K, "Keep it", "Change nothing", Answer::Close),
             ],
         )
     }
@@ -327,17 +331,13 @@ impl App {
         ScrollArea::vertical().max_height(LONGEST_TABLE).show(ui, |ui| {
             let later: Vec<_> = self.undo.redoable().collect();
             for (index, name) in later.iter().enumerate().rev() {
-                if ui
-                    .button(RichText::new(*name).weak())
-                    .on_hover_text("Go forth to behind this step")
-                    .clicked()
-                {
+                if ui.button(RichText::new(*name).weak()).on_hover_text("Redo up to this step").clicked() {
                     answer = Answer::Redo(index + 1);
                 }
             }
             ui.label(RichText::new("now").strong());
             for (index, name) in self.undo.undoable().enumerate() {
-                if ui.button(name).on_hover_text("Go back to before this step").clicked() {
+                if ui.button(name).on_hover_text("Undo back to before this step").clicked() {
                     answer = Answer::Undo(index + 1);
                 }
             }
@@ -355,7 +355,7 @@ fn listed(count: usize, name: &str) -> String {
     format!("{count} {name}{}", if count == 1 { "" } else { "s" })
 }
 
-/// What a session is called in sentences.
+/// Describes a session in sentences.
 fn document_name(document: &Document) -> String {
     document.model.as_ref().map_or_else(|| "before".to_owned(), |model| format!("“{}”", model.name))
 }
@@ -396,19 +396,19 @@ fn with_letter(ui: &Ui, key: Key, name: &str) -> LayoutJob {
 
 fn leave_driven_ui(ui: &mut Ui) -> Reply {
     ui.heading("Stop the robot and close?");
-    ui.label("The robot is driven. It falls when it is stopped, unless somebody holds it.");
+    ui.label("The robot is being driven. It will fall when stopped unless someone holds it.");
     let stop = Answer::Send(Command::StopAndQuit);
     answers_ui(
         ui,
         [
             (Key::S, "Stop and close", "Zero torque, motors off, then close the window", stop),
-            (Key::C, "Cancel", "Go on driving", Answer::Close),
+            (Key::C, "Cancel", "Continue driving", Answer::Close),
         ],
     )
 }
 
 fn gains_ui(changes: &[GainChange], ui: &mut Ui) -> Reply {
-    ui.heading("Apply these gains to the driven robot?");
+    ui.heading("Apply these gains to the robot being driven?");
     ui.label(format!("They change by more than a factor of {LARGEST_FACTOR}:"));
     Grid::new("large changes").num_columns(4).striped(true).spacing([24.0, 3.0]).show(ui, |ui| {
         for head in ["gain", "robot", "design", "change"] {
@@ -421,8 +421,8 @@ fn gains_ui(changes: &[GainChange], ui: &mut Ui) -> Reply {
     answers_ui(
         ui,
         [
-            (Key::A, "Apply them", "Fade the new gains in over 0.2 s", apply),
-            (Key::K, "Keep the gains", "The robot goes on with the previous gains", Answer::Close),
+            (Key::A, "Apply them", "Blend to the new gains over 0.2 s", apply),
+            (Key::K, "Keep the gains", "The robot continues with the previous gains", Answer::Close),
         ],
     )
 }
@@ -430,9 +430,9 @@ fn gains_ui(changes: &[GainChange], ui: &mut Ui) -> Reply {
 fn preset_ui(number: usize, name: &str, changes: &[Change], ui: &mut Ui) -> Reply {
     ui.heading(format!("Load the preset “{name}”?"));
     if changes.is_empty() {
-        ui.label("It is what the window shows already.");
+        ui.label("It is already loaded.");
     } else {
-        ui.label(format!("{} values change. Undo brings those of now back.", changes.len()));
+        ui.label(format!("{} values change. Undo restores the current ones.", changes.len()));
         changes_ui(changes, ["now", "then"], ui);
     }
     answers_ui(
@@ -446,8 +446,8 @@ fn preset_ui(number: usize, name: &str, changes: &[Change], ui: &mut Ui) -> Repl
 
 fn overwrite_ui(path: &Path, what: &str, save: &Command, ui: &mut Ui) -> Reply {
     ui.heading("Replace the file?");
-    ui.label(format!("There is already a file {}.", path.display()));
-    let help = format!("Save the {what} in its place");
+    ui.label(format!("The file {} exists.", path.display()));
+    let help = format!("Overwrite it with the {what}");
     answers_ui(
         ui,
         [
@@ -480,22 +480,22 @@ fn changes_ui(changes: &[Change], heads: [&str; 2], ui: &mut Ui) {
 }
 
 fn restore_ui(document: &Document, whole: bool, ui: &mut Ui) -> Reply {
-    ui.heading("flqr was not closed the last time");
+    ui.heading("flqr was not closed properly");
     ui.label(format!(
-        "The session of {} was kept, with changes that are in no file:",
+        "The session of {} was saved, with changes that are in no file:",
         document_name(document)
     ));
     if let (Some(saved), Some(model)) = (&document.saved_model, &document.model) {
         changes_ui(&saved.changes_to(model), ["saved", "kept"], ui);
     }
     if !whole {
-        warning_ui(ui, "Not all of it could be read: the Log page says what.");
+        warning_ui(ui, "It could be read only in part, see the Log page.");
     }
     answers_ui(
         ui,
         [
-            (Key::R, "Restore it", "Go on with the model as it was", Answer::Restore),
-            (Key::S, "Start afresh", "Leave the kept session in its file", Answer::StartAfresh),
+            (Key::R, "Restore it", "Restore the model", Answer::Restore),
+            (Key::S, "Start new", "Leave the saved session in its file", Answer::StartAfresh),
         ],
     )
 }
@@ -512,7 +512,7 @@ fn path_ui(
     if let Some(reason) = reason {
         warning_ui(ui, reason);
     }
-    let id = Id::unique("path of a dialog");
+    let id = Id::unique("path");
     let begins = !std::mem::replace(has_focus, true);
     if begins {
         // What is typed takes the place of what is offered.
@@ -535,12 +535,12 @@ fn path_ui(
     }
     let exists = saves(purpose) && !text.trim().is_empty() && Path::new(text.trim()).exists();
     if exists {
-        warning_ui(ui, "There is such a file: it is replaced only after a question.");
+        warning_ui(ui, "The file exists. You are asked before it is overwritten.");
     }
     let reply = answers_ui(
         ui,
         [
-            (Key::O, "OK", "Take this path", Answer::Send(Command::Say(String::new()))),
+            (Key::O, "OK", "Use this path", Answer::Send(Command::Say(String::new()))),
             (Key::C, "Cancel", "Go back", Answer::Close),
         ],
     );

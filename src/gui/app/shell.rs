@@ -32,7 +32,9 @@ impl App {
             }
         }
         Panel::bottom("status").frame(bar).show(ui, |ui| self.status_ui(ui));
+        let pages = ui.available_rect_before_wrap();
         self.page_ui(ui);
+        self.help_ui(pages, ui);
         self.palette_ui(ui);
         self.question_ui(ui.ctx());
         self.tour_ui(ui);
@@ -58,6 +60,14 @@ impl App {
         if self.tour.is_none() {
             self.recent.tour_done = true;
             self.save_recent();
+        }
+    }
+
+    fn help_ui(&mut self, area: egui::Rect, ui: &Ui) {
+        if let Some(help) = &mut self.help
+            && !help.ui(area, &self.commands, ui.ctx())
+        {
+            self.help = None;
         }
     }
 
@@ -203,7 +213,7 @@ impl App {
     fn numbers_ui(&self, ui: &mut Ui) {
         if let Some(cpu) = self.frame_cpu_s {
             ui.label(RichText::new(format!("frame {:4.1} ms", 1e3 * cpu)).small().monospace().weak())
-                .on_hover_text("Time that the last frame took, drawing by the graphics driver included");
+                .on_hover_text("Time of the last frame, including the graphics driver");
             ui.separator();
         }
         let (state, losses, help) = self.source_text();
@@ -212,7 +222,7 @@ impl App {
         ui.label(RichText::new(state).small());
     }
 
-    /// How the source stands, what was lost of it, and what that means.
+    /// State of the source and its losses.
     fn source_text(&self) -> (String, String, &'static str) {
         if self.source != Source::Simulated {
             let state = match (&self.link.status, self.link.is_open()) {
@@ -224,14 +234,14 @@ impl App {
             return (
                 format!("{}: {state}", self.source.name()),
                 format!("late {}   lost {}   dropped {}", counters.late, counters.lost, counters.dropped),
-                "Ticks of the control loop that came a period late, frames and samples that did not reach the loop, the window or the recording, and frames dropped by the system or the adapter",
+                "Late: control-loop ticks at least one period late. Lost: frames and samples that did not reach the loop, the window or the recording. Dropped: frames dropped by the system or the adapter",
             );
         }
         let live = &self.live.status;
         let state = if self.session.robot().is_none() {
             "no robot"
         } else if self.designer.in_force.is_none() {
-            "no design, nothing runs"
+            "no design"
         } else if live.fell {
             "simulated: fallen"
         } else if live.paused {
@@ -242,7 +252,7 @@ impl App {
         (
             state.to_owned(),
             format!("late {:.1} s   lost {}", live.late_s, live.lost_samples),
-            "Simulated time that was skipped because the machine was too slow, and samples that the plots missed",
+            "Simulated time skipped because the computer was too slow, and samples missing in the plots",
         )
     }
 }

@@ -26,14 +26,14 @@ const fn ctrl_shift(key: Key) -> KeyboardShortcut {
 /// Keys that take the torque off a robot that may move; they go before everything else, also in a field.
 pub(crate) const STOP_KEYS: [Key; 2] = [Key::Escape, Key::Space];
 
-/// What is done with the pointer or a bare key in one place, for the list of keys.
+/// Pointer and key gestures for the list of keys.
 pub(crate) const GESTURES: &[(&str, &str)] = &[
-    ("Esc, Space", "STOP a robot that is checked or driven: no torque, motors off"),
-    ("Space, ←, →", "play, step (with Shift or Alt: longer, shorter) an experiment"),
+    ("Esc, Space", "STOP the robot: no torque, motors off"),
+    ("Space, ←, →", "play or step an experiment (Shift: longer, Alt: shorter steps)"),
     ("Tab, Shift+Tab", "next, previous control"),
-    ("drag, ←, → of a weight", "1.5 % a point or press, with Shift 0.15 %"),
-    ("drag, wheel, double click", "move, zoom, follow again (plots)"),
-    ("drag of a tab", "move a page to another tile (once there are two)"),
+    ("drag, ←, → of a weight", "1.5 % per point or key press, 0.15 % with Shift"),
+    ("drag, wheel, double click", "pan, zoom, follow (plots)"),
+    ("drag a tab", "move a page to another tile (if there are several)"),
 ];
 
 const DIGITS: [Key; 9] =
@@ -74,7 +74,7 @@ fn file() -> Vec<Entry> {
             menu,
             "open",
             "Open…",
-            "What this page works on: a model, a log or a recording",
+            "Opens a model, a log or a recording, depending on the page",
             &[ctrl(Key::O)],
             |s| {
                 Ok(Command::AskFile(match s.tab {
@@ -91,45 +91,31 @@ fn file() -> Vec<Entry> {
             menu,
             "open-model",
             "Open a model…",
-            "A robot or an axis, from a TOML file",
+            "Robot or axis model, TOML",
             &[],
             dialog(FilePurpose::OpenModel),
         ),
-        entry(
-            menu,
-            "open-log",
-            "Open a log…",
-            "A measurement, from a CSV file",
-            &[],
-            dialog(FilePurpose::OpenLog),
-        )
-        .also("csv import measurement load"),
+        entry(menu, "open-log", "Open a log…", "Measured log, CSV", &[], dialog(FilePurpose::OpenLog))
+            .also("csv import measurement load"),
         entry(
             menu,
             "open-recording",
             "Open a recording to replay…",
-            "The rows or frames of an earlier session, through the same path as live data",
+            "Replay rows or frames of a recording like live data",
             &[],
             dialog(FilePurpose::OpenReplay),
         ),
-        entry(
-            menu,
-            "save",
-            "Save the model",
-            "To its file; to a new one if it has none",
-            &[ctrl(Key::S)],
-            |s| {
-                Ok(match s.model_path {
-                    Some(path) => Command::SaveModel(path.to_owned()),
-                    None => Command::AskFile(FilePurpose::SaveModel),
-                })
-            },
-        ),
+        entry(menu, "save", "Save the model", "Save to its file, or to a new one", &[ctrl(Key::S)], |s| {
+            Ok(match s.model_path {
+                Some(path) => Command::SaveModel(path.to_owned()),
+                None => Command::AskFile(FilePurpose::SaveModel),
+            })
+        }),
         entry(
             menu,
             "save-as",
             "Save the model as…",
-            "To a file of your choice",
+            "Save to a new file",
             &[ctrl_shift(Key::S)],
             dialog(FilePurpose::SaveModel),
         ),
@@ -137,7 +123,7 @@ fn file() -> Vec<Entry> {
             menu,
             "open-session",
             "Open a session…",
-            "Model, layout, sources and forms as they were saved",
+            "Restore model, layout, sources and forms",
             &[],
             dialog(FilePurpose::OpenSession),
         )
@@ -146,7 +132,7 @@ fn file() -> Vec<Entry> {
             menu,
             "save-session",
             "Save the session as…",
-            "Model, layout, sources and forms, in one file",
+            "Save model, layout, sources and forms in one file",
             &[],
             dialog(FilePurpose::SaveSession),
         )
@@ -172,8 +158,8 @@ fn file() -> Vec<Entry> {
         entry(
             menu,
             "save-report",
-            "Save the report of the search…",
-            "What the Refine page has found, as HTML",
+            "Save the refine report…",
+            "Results of the Refine page as HTML",
             &[],
             dialog(FilePurpose::Refine(RefineFile::Save(SavedAs::Report))),
         )
@@ -182,7 +168,7 @@ fn file() -> Vec<Entry> {
             menu,
             "save-refined",
             "Save the refined model…",
-            "The model with the effects that are ticked on the Refine page, as TOML",
+            "Model with the effects selected on the Refine page, TOML",
             &[],
             dialog(FilePurpose::Refine(RefineFile::Save(SavedAs::Model))),
         )
@@ -191,7 +177,7 @@ fn file() -> Vec<Entry> {
             menu,
             "quit",
             "Quit",
-            "Close the window; asks if the model is not saved or the robot is driven",
+            "Close the window; asks first if the model is unsaved or the robot is being driven",
             &[ctrl(Key::Q)],
             |_| Ok(Command::Quit),
         )
@@ -220,32 +206,33 @@ fn edit() -> Vec<Entry> {
         move |s: &Situation<'_>| if s.has_robot { Ok(command.clone()) } else { Err(NO_ROBOT) }
     };
     vec![
-        entry(menu, "undo", "Undo", "Take the last step back", &[ctrl(Key::Z)], |s| {
+        entry(menu, "undo", "Undo", "Undo the last step", &[ctrl(Key::Z)], |s| {
             if s.can_undo { Ok(Command::Undo) } else { Err("there is nothing to undo") }
         }),
-        entry(
-            menu,
-            "redo",
-            "Redo",
-            "Make the step again that was taken back",
-            &[ctrl_shift(Key::Z), ctrl(Key::Y)],
-            |s| if s.can_redo { Ok(Command::Redo) } else { Err("there is nothing to redo") },
-        ),
+        entry(menu, "redo", "Redo", "Redo the last undone step", &[ctrl_shift(Key::Z), ctrl(Key::Y)], |s| {
+            if s.can_redo { Ok(Command::Redo) } else { Err("there is nothing to redo") }
+        }),
         entry(
             menu,
             "copy-command",
             "Copy as a command",
-            "What does in a terminal what this page shows",
+            "Copy the command line that does what this page shows",
             &[],
-            |s| if s.tab == Tab::Log { Err("this page does nothing") } else { Ok(Command::CopyLine) },
+            |s| {
+                if s.tab == Tab::Log {
+                    Err("there is no command for this page")
+                } else {
+                    Ok(Command::CopyLine)
+                }
+            },
         ),
-        entry(menu, "steps", "Steps…", "All that can be undone, by name", &[], |_| Ok(Command::ShowSteps))
+        entry(menu, "steps", "Steps…", "List of all undoable steps", &[], |_| Ok(Command::ShowSteps))
             .also("history"),
         entry(
             menu,
             "weights",
             "Go to the first weight",
-            "The field of the first weight",
+            "Focus the field of the first weight",
             &[ctrl(Key::E)],
             of_robot(Command::FocusWeights),
         ),
@@ -253,7 +240,7 @@ fn edit() -> Vec<Entry> {
             menu,
             "path",
             "Go to the path",
-            "Of the log, or of what an experiment is saved to",
+            "Focus the path of the log, or of the file to save",
             &[ctrl(Key::L)],
             |_| Ok(Command::FocusPath),
         ),
@@ -261,26 +248,26 @@ fn edit() -> Vec<Entry> {
             menu,
             "reset-weights",
             "Reset the weights",
-            "Back to the weights of the loaded model",
+            "Restore the weights of the loaded model",
             &[],
             of_robot(Command::ResetWeights),
         ),
         entry(
             menu,
             "keep-a",
-            "Keep the design to compare with",
-            "The other one of A and B becomes the one in force",
+            "Swap designs A and B",
+            "Make the other design of A and B active",
             &[],
             of_robot(Command::KeepReference),
         ),
-        entry(menu, "swap-designs", "Swap A and B", "The other design comes into force", &[], |s| {
+        entry(menu, "swap-designs", "Swap A and B", "Make the other design active", &[], |s| {
             if s.has_reference { Ok(Command::SwapReference) } else { Err("there is no other design yet") }
         }),
         entry(
             menu,
             "back-to-a",
             "Back to the other design",
-            "Take the weights of the other one of A and B",
+            "Copy the weights of the other design",
             &[],
             |s| {
                 if s.has_reference {
@@ -294,17 +281,17 @@ fn edit() -> Vec<Entry> {
             menu,
             "apply-gains",
             "Apply the gains to the robot",
-            "The connected robot gets the gains of the design",
+            "Send the gains of the design to the connected robot",
             &[],
-            |s| if s.gains_wait { Ok(Command::ApplyGains) } else { Err("the robot runs them already") },
+            |s| if s.gains_wait { Ok(Command::ApplyGains) } else { Err("the robot already uses them") },
         ),
-        entry(menu, "controller-lqr", "Use LQR", "Gains alone", &[], |s| match s.controller {
-            ControllerKind::Lqr => Err("it is in use"),
+        entry(menu, "controller-lqr", "Use LQR", "State feedback only", &[], |s| match s.controller {
+            ControllerKind::Lqr => Err("already selected"),
             ControllerKind::Flqr => Ok(Command::SetController(ControllerKind::Lqr)),
         }),
-        entry(menu, "controller-flqr", "Use FLQR", "Gains plus friction feedforward", &[], |s| {
+        entry(menu, "controller-flqr", "Use FLQR", "State feedback plus friction feedforward", &[], |s| {
             match s.controller {
-                ControllerKind::Flqr => Err("it is in use"),
+                ControllerKind::Flqr => Err("already selected"),
                 ControllerKind::Lqr => Ok(Command::SetController(ControllerKind::Flqr)),
             }
         }),
@@ -326,8 +313,8 @@ fn view() -> Vec<Entry> {
                 format!("{}-{}", side.key(), tab.key()),
                 format!("{} {}", tab.title(), side.words()),
                 match side {
-                    Side::Back => "To the tile of the other pages",
-                    Side::Right | Side::Below => "In a tile of its own",
+                    Side::Back => "Move to the tile of the other pages",
+                    Side::Right | Side::Below => "Move to a separate tile",
                 },
                 &[],
                 move |_| Ok(Command::MoveTab(tab, side)),
@@ -335,7 +322,7 @@ fn view() -> Vec<Entry> {
             .group("Tiles")
             .also(match side {
                 Side::Back => "tile layout dock close join",
-                Side::Right => "tile layout dock split beside column",
+                Side::Right => "tile layout dock split right column",
                 Side::Below => "tile layout dock split below row",
             })
         })
@@ -344,8 +331,8 @@ fn view() -> Vec<Entry> {
     let mut all: Vec<Entry> = Tab::ALL.into_iter().enumerate().map(tab).collect();
     all.extend(Tab::ALL.into_iter().flat_map(beside));
     all.extend([
-        entry(menu, "reset-layout", "Reset the layout", "All pages in one tile again", &[], |s| {
-            if s.is_usual_layout { Err("it is as at the first start") } else { Ok(Command::ResetLayout) }
+        entry(menu, "reset-layout", "Reset the layout", "Move all pages into one tile", &[], |s| {
+            if s.is_usual_layout { Err("already the default layout") } else { Ok(Command::ResetLayout) }
         })
         .also("tiles split dock default"),
         entry(menu, "theme", "Light or dark", "Switch between light and dark", &[ctrl(Key::D)], |s| {
@@ -356,12 +343,19 @@ fn view() -> Vec<Entry> {
             menu,
             "larger",
             "Larger",
-            "Everything, by a tenth",
+            "Change the size of everything by 10 %",
             &[ctrl(Key::Plus), ctrl(Key::Equals)],
             zoom(1.1),
         ),
-        entry(menu, "smaller", "Smaller", "Everything, by a tenth", &[ctrl(Key::Minus)], zoom(1.0 / 1.1)),
-        entry(menu, "usual-size", "Usual size", "As the system scales", &[ctrl(Key::Num0)], |_| {
+        entry(
+            menu,
+            "smaller",
+            "Smaller",
+            "Change the size of everything by 10 %",
+            &[ctrl(Key::Minus)],
+            zoom(1.0 / 1.1),
+        ),
+        entry(menu, "usual-size", "Default size", "Use the scale of the system", &[ctrl(Key::Num0)], |_| {
             Ok(Command::SetZoom(1.0))
         }),
     ]);
@@ -372,7 +366,7 @@ fn run() -> Vec<Entry> {
     let menu = Menu::Run;
     let source = |(source, name, help): (Source, &'static str, &'static str)| {
         entry(menu, format!("source-{}", source.key()), format!("Source: {name}"), help, &[], move |s| {
-            if s.source == source { Err("it is chosen") } else { Ok(Command::SelectSource(source)) }
+            if s.source == source { Err("already selected") } else { Ok(Command::SelectSource(source)) }
         })
     };
     let mut all = vec![
@@ -380,10 +374,10 @@ fn run() -> Vec<Entry> {
             menu,
             "start",
             "Start or cancel",
-            "The fit, the search or the experiment; connects or disconnects on the Robot page",
+            "Start or cancel the fit, the search or the experiment; connect or disconnect on the Robot page",
             &[ctrl(Key::Enter)],
             |s| match s.tab {
-                Tab::Tune | Tab::Runs | Tab::Log => Err("this page starts nothing"),
+                Tab::Tune | Tab::Runs | Tab::Log => Err("nothing to start on this page"),
                 Tab::Friction => start_fit(s),
                 Tab::Refine => Ok(start_refine(s)),
                 Tab::Experiments => Ok(start_experiment(s)),
@@ -395,16 +389,16 @@ fn run() -> Vec<Entry> {
         entry(
             menu,
             "refine",
-            "Start or cancel the search for what the model lacks",
-            "In the logs of the Refine page",
+            "Start or cancel the search for missing effects",
+            "Uses the logs of the Refine page",
             &[],
             |s| Ok(start_refine(s)),
         ),
         entry(
             menu,
             "find-missing",
-            "Find what is missing",
-            "Look for effects that the model lacks, in the logs of the Refine page",
+            "Find missing effects",
+            "Find effects that the model lacks in the logs of the Refine page",
             &[],
             |s| ask(s, Question::Refine),
         )
@@ -412,8 +406,8 @@ fn run() -> Vec<Entry> {
         entry(
             menu,
             "residual",
-            "How far is the model?",
-            "The residual of the logs of the Refine page alone, without a search",
+            "Compute residual",
+            "Compute the residual of the logs of the Refine page without a search",
             &[],
             |s| ask(s, Question::Residual),
         )
@@ -421,8 +415,8 @@ fn run() -> Vec<Entry> {
         entry(
             menu,
             "use-found",
-            "Use in the model what was found",
-            "The effects that are ticked on the Refine page, and the corrected numbers",
+            "Use the effects in the model",
+            "Add the effects selected on the Refine page and the corrected parameters to the model",
             &[],
             |_| Ok(Command::Refine(RefineCommand::Use)),
         )
@@ -431,24 +425,19 @@ fn run() -> Vec<Entry> {
             menu,
             "use-fit",
             "Use the fit for both motors",
-            "The friction that the Friction page has fitted",
+            "Use the friction fitted on the Friction page",
             &[],
             |s| if s.has_log { Ok(Command::UseFit(Target::Both)) } else { Err("there is no log") },
         )
         .also("friction add model"),
-        entry(
-            menu,
-            "demo",
-            "Search the records of a demo robot",
-            "A simulated robot with something that its model does not have",
-            &[],
-            |_| Ok(Command::Refine(RefineCommand::Start(Question::Demo))),
-        ),
+        entry(menu, "demo", "Run the demo", "Simulated robot with a hidden effect", &[], |_| {
+            Ok(Command::Refine(RefineCommand::Start(Question::Demo)))
+        }),
         entry(
             menu,
             "overlay-runs",
             "Overlay the last two runs",
-            "Draw the last two runs of one kind over each other, on the Runs page",
+            "Overlay the last two runs of one kind on the Runs page",
             &[],
             |_| Ok(Command::Runs(RunsCommand::OverlayLast)),
         )
@@ -457,12 +446,12 @@ fn run() -> Vec<Entry> {
             menu,
             "rows",
             "Go to the runs",
-            "The box of the newest row of the Runs page: arrows go on, Space ticks",
+            "Focus the newest row of the Runs page: arrow keys move, Space selects",
             &[],
             |_| Ok(Command::Runs(RunsCommand::FocusRows)),
         )
         .also("rows table focus"),
-        entry(menu, "untick-runs", "Untick all runs", "Draw none of the rows of the Runs page", &[], |_| {
+        entry(menu, "untick-runs", "Deselect all runs", "Clear the selection on the Runs page", &[], |_| {
             Ok(Command::Runs(RunsCommand::UntickAll))
         })
         .also("runs clear"),
@@ -473,7 +462,7 @@ fn run() -> Vec<Entry> {
             menu,
             "connect",
             "Connect or disconnect the robot",
-            "As the form of the Robot page says",
+            "Uses the settings of the Robot page",
             &[],
             |s| {
                 if s.source == Source::Simulated {
@@ -483,31 +472,24 @@ fn run() -> Vec<Entry> {
                 }
             },
         ),
-        entry(menu, "stop", "STOP the robot", "No torque, motors off, at once", &[], |s| {
+        entry(menu, "stop", "STOP the robot", "No torque, motors off, immediately", &[], |s| {
             if s.is_hot { Ok(Command::Stop) } else { Err("no robot is driven") }
         }),
-        entry(menu, "pause", "Pause or go on", "The simulated robot or the replay", &[ctrl(Key::P)], |s| {
+        entry(menu, "pause", "Pause or resume", "The simulated robot or the replay", &[ctrl(Key::P)], |s| {
             match s.source {
                 Source::Simulated => Ok(Command::SetPaused(!s.paused)),
                 Source::Replay => Ok(Command::Order(SessionOrder::Pause(!s.replay_is_paused))),
                 Source::Emulated | Source::Can | Source::Slcan => Err("a robot cannot be paused"),
             }
         }),
-        entry(
-            menu,
-            "reset-simulation",
-            "Reset the simulated robot",
-            "To the start, with empty plots",
-            &[],
-            |s| {
-                if s.source == Source::Simulated {
-                    Ok(Command::ResetSimulation)
-                } else {
-                    Err("another source is chosen")
-                }
-            },
-        ),
-        entry(menu, "interfaces", "Look for interfaces", "CAN interfaces and serial ports", &[], |_| {
+        entry(menu, "reset-simulation", "Reset the simulated robot", "Restart with empty plots", &[], |s| {
+            if s.source == Source::Simulated {
+                Ok(Command::ResetSimulation)
+            } else {
+                Err("another source is selected")
+            }
+        }),
+        entry(menu, "interfaces", "Refresh interfaces", "CAN interfaces and serial ports", &[], |_| {
             Ok(Command::RefreshInterfaces)
         }),
     ];
@@ -524,7 +506,11 @@ fn start_fit(s: &Situation<'_>) -> Sent {
 }
 
 fn ask(s: &Situation<'_>, question: Question) -> Sent {
-    if s.refine_runs { Err("a search runs") } else { Ok(Command::Refine(RefineCommand::Start(question))) }
+    if s.refine_runs {
+        Err("a search is running")
+    } else {
+        Ok(Command::Refine(RefineCommand::Start(question)))
+    }
 }
 
 /// Opens the form that saves the plots of the page.
@@ -535,10 +521,10 @@ fn export(s: &Situation<'_>, kind: FigureKind) -> Sent {
         Tab::Experiments => "runs",
         Tab::Runs => "overlay",
         Tab::Refine if s.has_residual => crate::refine::RESIDUAL_STACK,
-        Tab::Refine => return Err("“Find what is missing” brings the plots of this page"),
+        Tab::Refine => return Err("use “Find missing effects” to get the plots of this page"),
         Tab::Tune | Tab::Friction | Tab::Robot | Tab::Log => return Err("this page has no plots now"),
     };
-    let asks = "Type the path to save to, or choose it.".to_owned();
+    let asks = "Type or choose the path to save to.".to_owned();
     Ok(Command::ChooseFigure(FigureFile { stack, kind }, Err(asks)))
 }
 
@@ -561,8 +547,17 @@ fn connect(s: &Situation<'_>) -> Command {
 fn help() -> Vec<Entry> {
     let menu = Menu::Help;
     vec![
-        entry(menu, "tour", "Tour", "A first look, in five steps", &[], |_| Ok(Command::StartTour)),
-        entry(menu, "palette", "Any command…", "This list, with a filter", &[ctrl(Key::K)], |_| {
+        entry(
+            menu,
+            "manual",
+            "Manual",
+            "The description of this page, with all other pages and a search",
+            &[KeyboardShortcut::new(Modifiers::NONE, Key::F1)],
+            |_| Ok(Command::ShowManual),
+        )
+        .also("help documentation guide"),
+        entry(menu, "tour", "Tour", "Introduction in five steps", &[], |_| Ok(Command::StartTour)),
+        entry(menu, "palette", "Any command…", "Searchable list of all commands", &[ctrl(Key::K)], |_| {
             Ok(Command::ShowPalette)
         }),
     ]

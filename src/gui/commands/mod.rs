@@ -1,4 +1,4 @@
-//! The one list of what the window can be told: menus, keys, help and palette are made of it.
+//! The one list of what the window can be determined: menus, keys, help and palette are made of it.
 
 mod entries;
 mod menu;
@@ -18,7 +18,7 @@ pub(crate) use entries::{GESTURES, STOP_KEYS};
 pub(crate) use menu::{keys_ui, menu_ui};
 pub(crate) use palette::Palette;
 
-/// Where a command is found.
+/// Menu of a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Menu {
     File,
@@ -45,7 +45,7 @@ impl Menu {
     }
 }
 
-/// What decides whether a command can be given, and what it sends.
+/// Conditions and payload of a command.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Situation<'a> {
     pub(crate) tab: Tab,
@@ -57,12 +57,12 @@ pub(crate) struct Situation<'a> {
     pub(crate) has_log: bool,
     pub(crate) fit_runs: bool,
     pub(crate) refine_runs: bool,
-    /// Whether the Refine page has plots of a residual.
+    /// True if the Refine page has plots of a residual.
     pub(crate) has_residual: bool,
     pub(crate) experiment_runs: bool,
     pub(crate) is_connected: bool,
     pub(crate) is_hot: bool,
-    /// Whether the connected robot runs other gains than those of the design.
+    /// True if the connected robot runs other gains than those of the design.
     pub(crate) gains_wait: bool,
     pub(crate) controller: ControllerKind,
     pub(crate) model_path: Option<&'a Path>,
@@ -73,7 +73,7 @@ pub(crate) struct Situation<'a> {
     pub(crate) is_usual_layout: bool,
 }
 
-/// What to send, or why that cannot be now.
+/// Command to send, or the reason why it is unavailable.
 pub(crate) type Sent = Result<Command, &'static str>;
 
 /// One command.
@@ -92,17 +92,17 @@ pub(crate) struct Entry {
 }
 
 impl Entry {
-    /// The same, found by other words too.
+    /// Adds search keywords.
     fn also(self, words: &'static str) -> Self {
         Self { also: words, ..self }
     }
 
-    /// The same in a menu of its own.
+    /// Sets the menu.
     fn group(self, title: &'static str) -> Self {
         Self { group: Some(title), ..self }
     }
 
-    /// What the command sends as things stand, or why it cannot be given.
+    /// Returns the command to send, or the reason why it is unavailable.
     pub(crate) fn send(&self, situation: &Situation<'_>) -> Sent {
         (self.send)(situation)
     }
@@ -140,7 +140,7 @@ pub(crate) fn pressed(ctx: &Context) -> Option<&'static Entry> {
         all.sort_by_key(|(keys, _)| std::cmp::Reverse(modifiers(keys)));
         all
     });
-    // A field has an undo of its own.
+    // A field has a separate undo.
     let typing = ctx.text_edit_focused();
     ctx.input_mut(|input| {
         let free = |entry: &Entry| !(typing && matches!(&*entry.id, "undo" | "redo"));

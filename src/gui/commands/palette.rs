@@ -36,7 +36,7 @@ impl Palette {
         let (up, down) = (pressed(ui, Key::ArrowUp), pressed(ui, Key::ArrowDown));
         let enter = pressed(ui, Key::Enter);
         let field = TextEdit::singleline(&mut self.filter)
-            .hint_text("type a part of a command's name")
+            .hint_text("type part of a command name")
             .desired_width(f32::INFINITY);
         let field = ui.add(field).accessible_name("command");
         if !std::mem::replace(&mut self.has_focus, true) {
@@ -47,7 +47,7 @@ impl Palette {
         }
         let found = found(&self.filter);
         if found.is_empty() {
-            hint_ui(ui, "No command has these letters in its name.");
+            hint_ui(ui, "No command matches.");
             return true;
         }
         self.chosen = (self.chosen + usize::from(down)).saturating_sub(usize::from(up)).min(found.len() - 1);
@@ -110,7 +110,7 @@ pub(super) fn found(filter: &str) -> Vec<usize> {
     found.into_iter().map(|(_, index)| index).collect()
 }
 
-/// How far a command is from `filter`: by its name, or as a part of a name by its other words.
+/// Distance of a command from `filter`: by its name, or as a part of a name by its other words.
 fn distance_to(filter: &str, entry: &Entry) -> Option<(usize, usize)> {
     let known = |word: &str| entry.also.split(' ').any(|other| other.starts_with(word));
     let by_words = filter.split_whitespace().all(known) && !filter.is_empty();
@@ -118,7 +118,7 @@ fn distance_to(filter: &str, entry: &Entry) -> Option<(usize, usize)> {
     by_name.into_iter().chain(by_words.then_some((3, 1))).min()
 }
 
-/// How far `name` is from `filter`; none where it has not all of its letters in their order. The whole name is
+/// Distance of `name` from `filter`; `None` if the letters are not all in it in order. The whole name is
 /// nearest, then its start, then the start of a word in it, then a part of it, then letters near each other.
 fn distance(filter: &str, name: &str) -> Option<(usize, usize)> {
     if filter.is_empty() {
@@ -163,7 +163,7 @@ mod tests {
             ("csv", "export-csv"),
             ("import", "open-log"),
             ("export", "export-csv"),
-            ("how far", "residual"),
+            ("residual", "residual"),
             ("report", "save-report"),
             ("exit", "quit"),
         ] {

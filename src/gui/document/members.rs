@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-/// The members of the object in `text`, each none where its value cannot be read, and whether the text ends early.
+/// The members of the object in `text`, each `None` if its value cannot be read, and whether the text ends early.
 pub(super) fn members(text: &str) -> (Vec<(String, Option<Value>)>, bool) {
     let mut found = Vec::new();
     let Some(mut rest) = text.trim_start().strip_prefix('{') else { return (found, true) };
@@ -28,7 +28,7 @@ pub(super) fn members(text: &str) -> (Vec<(String, Option<Value>)>, bool) {
     }
 }
 
-/// Where the value at the start of `text` ends; none where the text ends before it.
+/// End of the value at the start of `text`; `None` if the text ends before it.
 fn value_end(text: &str) -> Option<usize> {
     let (mut depth, mut in_text, mut escaped) = (0_usize, false, false);
     for (at, byte) in text.bytes().enumerate() {

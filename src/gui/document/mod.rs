@@ -10,7 +10,7 @@ mod undo;
 use std::path::PathBuf;
 
 use flqr_core::control::ControllerKind;
-use flqr_core::model_file::Model;
+use flqr_core::model::Model;
 use serde_json::{Value, json};
 
 use crate::command::Source;
@@ -24,18 +24,18 @@ pub(crate) use undo::{Base, Content, Undo, words};
 
 const FORMAT: &str = "flqr-session";
 const VERSION: u64 = 1;
-/// What is said of a file that is none.
-pub(crate) const NO_SESSION: &str = "it is no session file of flqr";
+/// Message for a file that is not a session.
+pub(crate) const NO_SESSION: &str = "it is not a session file of flqr";
 /// Ending of the files.
 pub(crate) const EXTENSION: &str = "flqr-session";
 /// A session file larger than this is none.
 pub(crate) const LARGEST_BYTES: u64 = 64 << 20;
 
-/// What a file keeps; a part that was not read is none.
+/// Contents of a session file; `None` for missing parts.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Document {
     pub(crate) model: Option<Model>,
-    /// The model as its file has it; none where that is `model`.
+    /// The model as its file has it; `None` if that is `model`.
     pub(crate) saved_model: Option<Model>,
     pub(crate) model_path: Option<PathBuf>,
     pub(crate) controller: Option<ControllerKind>,
@@ -55,7 +55,7 @@ pub(crate) struct Document {
 }
 
 impl Document {
-    /// Whether the model has changes that its file has not.
+    /// Returns whether the model has changes that its file has not.
     pub(crate) fn has_unsaved_model(&self) -> bool {
         self.saved_model.is_some() && self.saved_model != self.model
     }
@@ -114,7 +114,7 @@ impl Document {
         format!("{value:#}\n")
     }
 
-    /// What could be read of a file's text, and a sentence about each part that could not.
+    /// Parses a session file; also returns a sentence for each part that could not be read.
     pub(crate) fn from_json(text: &str) -> (Self, Vec<String>) {
         let mut document = Self::default();
         let mut problems = Vec::new();
@@ -128,7 +128,7 @@ impl Document {
         match part("version").and_then(Value::as_u64) {
             Some(VERSION) => {}
             Some(version) if version > VERSION => problems.push(format!(
-                "it is of a newer flqr (version {version} of the format, known is {VERSION}): what is known of it is used"
+                "it was written by a newer version of flqr (format {version}, supported {VERSION}): unknown parts are ignored"
             )),
             None if cut => {}
             _ => problems.push("its version cannot be read".to_owned()),
@@ -199,7 +199,7 @@ impl Document {
                 self.runs = Some(runs);
                 return problem.map_or(Ok(()), Err);
             }
-            _ => return Err(format!("“{key}” is not known and was left out")),
+            _ => return Err(format!("“{key}” is unknown and was ignored")),
         }
         Ok(())
     }
@@ -212,8 +212,8 @@ fn ends_early(parts: &[(String, Option<Value>)]) -> String {
     let lost: Vec<_> =
         whole.iter().filter(|(key, _)| !is_there(key)).map(|(key, _)| format!("“{key}”")).collect();
     match lost.is_empty() {
-        true => "it ends early".to_owned(),
-        false => format!("it ends early, without {}", lost.join(", ")),
+        true => "it is truncated".to_owned(),
+        false => format!("it is truncated, without {}", lost.join(", ")),
     }
 }
 
@@ -294,9 +294,9 @@ mod tests {
             ("1.5", "1e999", "“zoom” cannot be read"),
             ("\"lqr\"", "\"pid\"", "“controller” cannot be read"),
             ("\"lqr\"", "17", "“controller” cannot be read"),
-            ("\"version\": 1", "\"version\": 2", "newer flqr (version 2"),
+            ("\"version\": 1", "\"version\": 2", "newer version of flqr (format 2"),
             ("\"version\": 1", "\"version\": null", "its version cannot be read"),
-            ("\"theme\"", "\"colours\": [], \"theme\"", "“colours” is not known"),
+            ("\"theme\"", "\"colours\": [], \"theme\"", "“colours” is unknown"),
             ("body_mass_kg = 13.0", "body_mass_kg = nan", "“model” is refused"),
             ("12.5", "-Infinity", "“experiment” cannot be read"),
         ] {
@@ -314,7 +314,7 @@ mod tests {
         for text in ["", "{", "[]", "null", "\u{0}\u{1}", "{\"format\": \"other\"}", "name = \"x\""] {
             let (read, problems) = Document::from_json(text);
             assert_eq!(read, Document::default(), "{text:?}");
-            assert_eq!(problems, ["it is no session file of flqr"], "{text:?}");
+            assert_eq!(problems, ["it is not a session file of flqr"], "{text:?}");
         }
         // Random bytes never do harm either.
         let mut seed = 7_u64;

@@ -1,4 +1,4 @@
-//! Where the running session is kept: one slot for each window that is open at the same time.
+//! Storage of the running session: one slot for each window that is open at the same time.
 //!
 //! A slot is a file and a lock that the system lets go of when the program ends, however it ends. A file in a slot
 //! that nobody holds is what a window left behind that was not closed.
@@ -16,7 +16,7 @@ const SLOTS: usize = 8;
 /// The session is looked at this often, while something happens.
 const INTERVAL: Duration = Duration::from_secs(1);
 
-/// Where sessions are usually kept; none where the system names no folder for it.
+/// Default folder of sessions; `None` if the system defines none.
 pub fn default_folder() -> Option<PathBuf> {
     let folder = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
     let state = if cfg!(windows) {
@@ -29,15 +29,15 @@ pub fn default_folder() -> Option<PathBuf> {
     Some(state.join("flqr"))
 }
 
-/// What was found at the start.
+/// Sessions found at start.
 pub(crate) struct Opened {
-    /// Its slot; none where all are taken or the folder cannot be used.
+    /// Its slot; `None` if all are taken or the folder cannot be used.
     pub(crate) store: Option<Store>,
-    /// What a window left behind that was not closed.
+    /// Session of a window that was not closed properly.
     pub(crate) left: Option<Left>,
     /// The session of the window that was closed last, and its text.
     pub(crate) last: Option<(PathBuf, String)>,
-    /// Why nothing will be kept.
+    /// Reason why the session will not be saved.
     pub(crate) problem: Option<String>,
 }
 
@@ -64,7 +64,10 @@ pub(crate) fn open(folder: &Path) -> Opened {
     let last = read(&last).map(|text| (last, text));
     let mut opened = Opened { store: None, left: None, last, problem: None };
     let problem = |error: &std::io::Error| {
-        Some(format!("The session will not be kept: {} cannot be used ({error}).", folder.display()))
+        Some(format!(
+            "The session will not be saved automatically: {} cannot be used ({error}).",
+            folder.display()
+        ))
     };
     if let Err(error) = std::fs::create_dir_all(folder) {
         opened.problem = problem(&error);
@@ -95,7 +98,7 @@ pub(crate) fn open(folder: &Path) -> Opened {
     }
     if opened.store.is_none() {
         opened.problem = Some(format!(
-            "The session will not be kept: all {SLOTS} places in {} are taken. Close other windows, or move the running-*.{EXTENSION} files there elsewhere.",
+            "The session will not be saved automatically: all {SLOTS} slots in {} are in use. Close other windows, or move the running-*.{EXTENSION} files there to another folder.",
             folder.display()
         ));
     }
@@ -136,10 +139,10 @@ pub(crate) struct Store {
     written: Option<Document>,
     looked: Option<Instant>,
     job: Option<Writing>,
-    /// Why the last write could not even begin.
+    /// Reason why the last write could not start.
     not_begun: Option<String>,
     failed: bool,
-    /// What the session has taken over, removed once that is on the disk.
+    /// Files taken over by the session, removed after it is saved.
     taken: Vec<Left>,
     /// As above, and in what is being written.
     in_job: Vec<Left>,
@@ -169,7 +172,7 @@ impl Store {
         self.looked = None;
     }
 
-    /// How long until the session is to be looked at; none for now.
+    /// Time until the next save; `None` if none is due.
     pub(crate) fn wait(&self) -> Option<Duration> {
         INTERVAL.checked_sub(self.looked?.elapsed()).filter(|wait| !wait.is_zero())
     }
@@ -184,7 +187,7 @@ impl Store {
         let write = move |_: &Reporter<()>| {
             write_file(&path, content.to_json().as_bytes()).map_err(|error| {
                 format!(
-                    "The session could not be kept in {}: {error}; what was kept last is still there. Make room or save to another disk.",
+                    "The session could not be saved automatically in {}: {error}. The last saved state is still there. Free disk space or save to another disk.",
                     path.display()
                 )
             })
@@ -204,34 +207,36 @@ impl Store {
             }
             Err(error) => {
                 self.not_begun = Some(format!(
-                    "The session could not be kept: no thread to write it ({error}). Close other programs."
+                    "The session could not be saved automatically ({error}). Close other programs."
                 ));
             }
         }
     }
 
-    /// What to say of the last write: why it failed, once, or that it is well again.
+    /// Message about the last write: why it failed, once, or that it is well again.
     pub(crate) fn drain(&mut self) -> Option<Result<String, String>> {
         let result = match self.not_begun.take() {
             Some(problem) => Err(problem),
             None => match self.job.as_mut()?.poll().1 {
                 Outcome::Running => return None,
                 Outcome::Done(result) => result,
-                Outcome::Broken => Err("Keeping the session failed: this is a defect of flqr.".to_owned()),
+                Outcome::Broken => {
+                    Err("Saving the session automatically failed: this is an internal error.".to_owned())
+                }
             },
         };
         self.job = None;
         let failed_before = std::mem::replace(&mut self.failed, result.is_err());
         match result {
             Err(problem) => {
-                // Tried again at the next look.
+                // ScoredCandidate again at the next look.
                 self.written = None;
                 self.taken.append(&mut self.in_job);
                 (!failed_before).then_some(Err(problem))
             }
             Ok(()) => {
                 remove(&mut self.in_job);
-                failed_before.then(|| Ok("The session is kept again.".to_owned()))
+                failed_before.then(|| Ok("The session is saved automatically again.".to_owned()))
             }
         }
     }
@@ -289,7 +294,7 @@ mod tests {
         None
     }
 
-    /// What was given to `keep`, of the text of a file.
+    /// Returns the session in the text of a file.
     fn kept(text: &str) -> String {
         Document::from_json(text).0.column_map.unwrap()
     }
@@ -352,7 +357,7 @@ mod tests {
         let folder = Folder::new("full");
         let mut windows: Vec<_> = (0..SLOTS).map(|_| open(&folder.0)).collect();
         assert!(windows.iter().all(|window| window.problem.is_none()));
-        assert!(open(&folder.0).problem.unwrap().contains("are taken"));
+        assert!(open(&folder.0).problem.unwrap().contains("are in use"));
         windows.pop();
         assert!(open(&folder.0).problem.is_none());
     }
@@ -377,16 +382,16 @@ mod tests {
         let file = folder.0.join("file");
         std::fs::write(&file, "no folder").unwrap();
         let refused = open(&file.join("inside"));
-        assert!(refused.store.is_none() && refused.problem.unwrap().contains("will not be kept"));
+        assert!(refused.store.is_none() && refused.problem.unwrap().contains("will not be saved"));
 
         let mut opened = open(&folder.0.join("state"));
         let store = opened.store.as_mut().unwrap();
         // A folder in the place of the file refuses every write, also for an administrator.
         std::fs::create_dir_all(store.path.join("inside")).unwrap();
-        assert!(keep(store, "one").unwrap().unwrap_err().contains("could not be kept"));
+        assert!(keep(store, "one").unwrap().unwrap_err().contains("could not be saved"));
         assert_eq!(keep(store, "two"), None, "said once");
         std::fs::remove_dir_all(&store.path).unwrap();
-        assert_eq!(keep(store, "two"), Some(Ok("The session is kept again.".to_owned())));
+        assert_eq!(keep(store, "two"), Some(Ok("The session is saved automatically again.".to_owned())));
     }
 
     #[test]
@@ -398,10 +403,10 @@ mod tests {
             store.begun(Err(std::io::ErrorKind::WouldBlock.into()), Document::default());
             store.drain()
         };
-        assert!(refuse().unwrap().unwrap_err().contains("no thread"));
+        assert!(refuse().unwrap().unwrap_err().contains("Close other programs"));
         assert_eq!(refuse(), None, "said once");
         // The document that was refused is not taken for written.
-        assert_eq!(keep(store, "one"), Some(Ok("The session is kept again.".to_owned())));
+        assert_eq!(keep(store, "one"), Some(Ok("The session is saved automatically again.".to_owned())));
         assert_eq!(kept(&std::fs::read_to_string(&store.path).unwrap()), "one");
     }
 }

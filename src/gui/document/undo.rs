@@ -14,7 +14,7 @@ use crate::session::Session;
 /// The oldest steps go first.
 const LONGEST: usize = 200;
 
-/// What is undone.
+/// Undone step.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Content {
     pub(crate) session: Session,
@@ -28,7 +28,7 @@ pub(crate) struct Content {
 }
 
 impl Content {
-    /// Whether nothing that is worth a step differs; which page is in front is not.
+    /// Returns whether nothing that is worth a step differs; which page is in front is not.
     fn is_alike(&self, other: &Self) -> bool {
         (self.base, self.ledger) == (other.base, other.ledger)
             && self.session == other.session
@@ -57,7 +57,7 @@ pub(crate) struct Undo {
     now: Content,
     past: Vec<Step>,
     future: Vec<Step>,
-    /// What the next step is called, where whoever makes it knows better than the values.
+    /// Name of the next step, if given by its caller.
     name: Option<String>,
     bases: Vec<Base>,
 }
@@ -123,7 +123,7 @@ impl Undo {
         self.name = None;
     }
 
-    /// What there was at the last step.
+    /// State at the last step.
     pub(crate) fn now(&self) -> &Content {
         &self.now
     }
@@ -138,7 +138,7 @@ impl Undo {
         self.future.iter().rev().map(|step| &*step.name)
     }
 
-    /// What undo would bring back, or redo bring.
+    /// State restored by undo or redo.
     pub(crate) fn peek(&self, redo: bool) -> Option<&Content> {
         let steps = if redo { &self.future } else { &self.past };
         steps.last().map(|step| &step.content)
@@ -221,7 +221,7 @@ fn entry_words(key: &str) -> Option<String> {
     Some(if row == column { format!("{row} weight") } else { format!("{row} with {column} weight") })
 }
 
-/// A key without a name of its own: its table, its words, and its unit in brackets.
+/// A key without a separate name: its table, its words, and its unit in brackets.
 fn plain_words(key: &str) -> String {
     let (table, name) = key.rsplit_once('.').unwrap_or(("", key));
     let (name, unit) = name_and_unit(name);

@@ -1,4 +1,4 @@
-//! What is to be run: scenario, duration, seed, and the buttons that start and stop it.
+//! Experiment settings: scenario, duration, seed, and the buttons that start and stop it.
 
 use std::cell::Cell;
 use std::rc::Rc;
@@ -73,7 +73,9 @@ fn numbers_ui(settings: &mut Settings, limited: &mut Limited, ui: &mut Ui) {
             limited.seconds = within != settings.seconds;
         }
         settings.seconds = within;
-        field.on_hover_text("Simulated time, at most 600 s here; the command runs longer ones");
+        field.on_hover_text(
+            "Simulated time, at most 600 s in the window; use the command line for longer runs",
+        );
         ui.label("s");
     });
     ui.end_row();
@@ -87,7 +89,7 @@ fn numbers_ui(settings: &mut Settings, limited: &mut Limited, ui: &mut Ui) {
     if let Some(negative) = negative.get().or(field.changed().then_some(false)) {
         limited.seed = negative;
     }
-    field.on_hover_text("Seed of all noise: same model, settings and seed, same result");
+    field.on_hover_text("Random seed: the same model, settings and seed give the same result");
     ui.end_row();
     if !settings.scenario.on_ground() {
         gains_ui(settings, ui);
@@ -106,12 +108,12 @@ fn gains_ui(settings: &mut Settings, ui: &mut Ui) {
     ui.label("gains");
     let paper = PAIRS.iter().find(|(pair, _)| settings.speed_gains == Some(*pair));
     let shown = match (settings.speed_gains, paper) {
-        (None, _) => "of the scenario",
+        (None, _) => "default of the scenario",
         (_, Some((_, name))) => name,
         _ => "own",
     };
     let combo = ComboBox::from_id_salt("gains").selected_text(shown).width(110.0).show_ui(ui, |ui| {
-        ui.selectable_value(&mut settings.speed_gains, None, "of the scenario");
+        ui.selectable_value(&mut settings.speed_gains, None, "default of the scenario");
         for (pair, name) in PAIRS {
             ui.selectable_value(&mut settings.speed_gains, Some(pair), name);
         }
@@ -119,7 +121,7 @@ fn gains_ui(settings: &mut Settings, ui: &mut Ui) {
     combo
         .response
         .on_hover_text(
-            "kp and ki of the speed control: the scenario's, or a pair of the paper's Figures 6 and 7",
+            "kp and ki of the speed control: the scenario's default, or a pair from Figures 6 and 7 of the paper",
         )
         .accessible_name("gains of the speed control");
     ui.end_row();
@@ -152,7 +154,7 @@ fn run_ui(context: &ViewContext<'_>, settings: &Settings, runs: &Runs, ui: &mut 
     let text = RichText::new(format!("Run {} and {}", names[0], names[1])).strong();
     let fill = ui.visuals().selection.bg_fill;
     let button = ui.add_sized([ui.available_width(), 26.0], Button::new(text).fill(fill));
-    if button.on_hover_text("Run both with the model as it is now (Ctrl+Enter)").clicked() {
+    if button.on_hover_text("Run both with the current model (Ctrl+Enter)").clicked() {
         context.commands.send(Command::StartExperiment);
     }
 }

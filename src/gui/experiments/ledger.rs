@@ -70,13 +70,13 @@ impl Comparison {
         spread.chain(settled).collect::<Vec<_>>().join(", ")
     }
 
-    /// What an export says of a run, once it has its row.
+    /// Description of a run in exports, once it has its row.
     pub(super) fn provenance(&self, variant: Variant) -> Option<String> {
         let rows = self.rows.get()?;
         rows.iter().find(|(of, _)| *of == variant).map(|(_, run)| run.provenance())
     }
 
-    /// What an export says of both.
+    /// Description of both in exports.
     pub(super) fn provenances(&self) -> Vec<String> {
         Variant::ALL.into_iter().filter_map(|variant| self.provenance(variant)).collect()
     }

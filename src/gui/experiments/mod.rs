@@ -19,7 +19,7 @@ mod table;
 use std::path::{Path, PathBuf};
 
 use egui::{Color32, Context, Rect, RichText, Ui, Vec2, vec2};
-use flqr_core::model_file::{Model, RobotModel};
+use flqr_core::model::{Model, RobotModel};
 use flqr_core::simulate::{Scenario, Summary};
 
 use crate::command::{Commands, FilePurpose};
@@ -49,7 +49,7 @@ const STEP_VIEW_S: f64 = 2.0;
 
 /// State of the page.
 pub(crate) struct ExperimentsTab {
-    /// What the next runs are made with.
+    /// Settings of the next runs.
     settings: Settings,
     limited: Limited,
     preflight: Preflight,
@@ -59,7 +59,7 @@ pub(crate) struct ExperimentsTab {
     playback: Playback,
     table: StatisticsTable,
     saver: SaveForm<SavedAs>,
-    /// Where plots, robot and statistics were drawn.
+    /// Areas of plots, robot and statistics.
     page: Rect,
     /// Height of the statistics when they were drawn last.
     table_height: f32,
@@ -84,7 +84,7 @@ impl Default for ExperimentsTab {
 }
 
 impl ExperimentsTab {
-    /// What the next runs are made with.
+    /// Settings of the next runs.
     pub(crate) fn settings(&self) -> &Settings {
         &self.settings
     }
@@ -115,7 +115,7 @@ impl ExperimentsTab {
         self.saver.problem = None;
         self.runs
             .start(&self.settings, model, path, waker)
-            .map_err(|error| format!("No thread for the runs: {error}."))
+            .map_err(|error| format!("Cannot start the runs: {error}."))
     }
 
     /// Saves the runs that are shown.
@@ -128,7 +128,7 @@ impl ExperimentsTab {
         waker: &Waker,
     ) -> Result<(), String> {
         let Some(comparison) = self.runs.comparison() else {
-            return Err("There is no run to save: run an experiment first.".to_owned());
+            return Err("There is no run to save. Run an experiment first.".to_owned());
         };
         let visible_s = self.plots.stack.view.range();
         let extent = Extent { range_s: self.table.range(comparison, visible_s), visible_s };
@@ -204,7 +204,7 @@ impl ExperimentsTab {
         self.playback.advance(ctx, &mut self.marks);
     }
 
-    /// What the page shows, as `--state-out` writes it.
+    /// State of the page for `--state-out`.
     pub(crate) fn snapshot(&self) -> serde_json::Value {
         let runs = self.runs.comparison().map(|comparison| {
             let range = self.table.range(comparison, self.plots.stack.view.range());
@@ -234,7 +234,7 @@ impl ExperimentsTab {
             panes_ui(ui, "no experiment", &panes, |part, ui| match part {
                 Part::Form => self.form_ui(context, ui),
                 _ => {
-                    let hint = "Choose an experiment at the left and run it: both controllers appear here, side by side.";
+                    let hint = "Choose an experiment on the left and run it. Both controllers are shown here side by side.";
                     empty_page_ui(ui, "No run yet.", hint, |_| {});
                 }
             });
@@ -274,9 +274,9 @@ impl ExperimentsTab {
     fn outcome_ui(&self, context: &ViewContext<'_>, ui: &mut Ui) {
         let Some(comparison) = self.runs.comparison() else { return };
         if comparison.settings != self.settings {
-            hint_ui(ui, "The plots show runs with other settings: run again for these.");
+            hint_ui(ui, "The plots show runs with other settings. Run again to update them.");
         } else if comparison.model.rig != context.session.model_in_use().rig {
-            warning_ui(ui, "The model was changed after these runs: run again to see what that does.");
+            warning_ui(ui, "The model has changed since these runs. Run again to update them.");
         }
         for (title, sentence) in comparison.failures() {
             let sentence = format!("{title}: {sentence}");
@@ -333,7 +333,7 @@ impl ExperimentsTab {
 
     fn head_ui(&mut self, comparison: &Comparison, ui: &mut Ui) {
         let settings = &comparison.settings;
-        // The list at the left says it too.
+        // The list at the left reports it too.
         if ui.available_width() >= 420.0 {
             ui.label(RichText::new(settings.scenario.title()).heading().strong());
         }
@@ -441,6 +441,6 @@ fn commands_ui(comparison: &Comparison, ui: &mut Ui) {
         }
     });
     if comparison.model_path.is_none() {
-        hint_ui(ui, "No file holds the model of these runs: save it, put its path in place of MODEL.toml.");
+        hint_ui(ui, "The model of these runs is unsaved: save it and replace MODEL.toml by its path.");
     }
 }

@@ -22,7 +22,7 @@ const LONGEST_FRAME_S: f32 = 0.25;
 /// Between two pictures while playing.
 const FRAME: std::time::Duration = std::time::Duration::from_millis(16);
 
-/// Whether and how fast the time runs.
+/// True if and how fast the time runs.
 pub(super) struct Playback {
     pub(super) playing: bool,
     pub(super) speed: f64,
@@ -90,11 +90,8 @@ impl Playback {
     /// Play, speed and the time as a slider.
     pub(super) fn ui(&mut self, ui: &mut Ui, marks: &mut Marks) {
         ui.horizontal(|ui| {
-            let (name, help) = if self.playing {
-                ("Pause", "Hold the time (Space)")
-            } else {
-                ("Play", "Let the time run (Space)")
-            };
+            let (name, help) =
+                if self.playing { ("Pause", "Pause playback (Space)") } else { ("Play", "Play (Space)") };
             if ui.add(Button::new(name).min_size(vec2(52.0, 0.0))).on_hover_text(help).clicked() {
                 self.toggle(marks);
             }
@@ -107,7 +104,7 @@ impl Playback {
                     .show_value(false)
                     .trailing_fill(true);
                 let slider = ui.add(slider).accessible_name("time");
-                let help = "Drag, or ← and → by 0.1 s, with Shift by 1 s, with Alt by 1 ms; Home and End";
+                let help = "Drag, or use ← and → (0.1 s; Shift 1 s, Alt 1 ms), Home and End";
                 if slider.on_hover_text(help).changed() {
                     self.playing = false;
                 }
@@ -122,6 +119,6 @@ impl Playback {
                 ui.selectable_value(&mut self.speed, speed, name);
             }
         });
-        combo.response.on_hover_text("Seconds of the run a second").accessible_name("speed of time");
+        combo.response.on_hover_text("Playback speed").accessible_name("playback speed");
     }
 }

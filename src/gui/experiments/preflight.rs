@@ -1,8 +1,8 @@
-//! What is known before a run: whether it can be made, and how much the loop bears as it runs.
+//! Checks before a run: whether it can be made, and the margins of the sampled loop.
 
 use egui::Ui;
 use flqr_core::lqr::Margins;
-use flqr_core::model_file::Model;
+use flqr_core::model::Model;
 
 use super::run::{Settings, Variant, check};
 use crate::context::ViewContext;
@@ -33,12 +33,12 @@ impl Preflight {
         let designed = context.designer.in_force.filter(|_| settings.scenario.on_ground());
         if let Some(margins) = designed.map(|designed| designed.margins).filter(|margins| margins.stable) {
             hint_ui(ui, text(&margins)).on_hover_text(
-                "Of the loop as it runs: at 1 kHz, with the model's delay and IMU, both motors together. Friction, limits and noise are not in it.",
+                "Sampled loop at 1 kHz with the model's delay and IMU, both motors together; without friction, limits and noise.",
             );
         }
     }
 
-    /// Whether a sentence is among those that are shown.
+    /// Returns whether a sentence is among those that are shown.
     pub(super) fn says(&self, sentence: &str) -> bool {
         self.refusals.iter().chain(&self.warnings).any(|shown| shown == sentence)
     }
@@ -58,7 +58,7 @@ impl Preflight {
 
 fn text(margins: &Margins) -> String {
     let delay = if margins.delay_s.is_finite() {
-        format!("{} ms more delay", shown(1e3 * margins.delay_s, 3))
+        format!("{} ms additional delay", shown(1e3 * margins.delay_s, 3))
     } else {
         "any delay".to_owned()
     };

@@ -23,16 +23,16 @@ pub(super) fn document(comparison: &Comparison, range_s: [f64; 2]) -> Document {
     }
     blocks.extend(statistics(comparison, range_s).into_iter().chain(tracking(comparison)).map(Block::Table));
     blocks.push(Block::Figure(chart(comparison, [0.0, comparison.end_s()])));
-    blocks.push(Block::section("How it was made"));
+    blocks.push(Block::section("Reproduction"));
     blocks.push(Block::paragraph(format!(
-        "Model “{}”, {} s, seed {}. Either run can be made again with its command:",
+        "Model “{}”, {} s, seed {}. Commands to repeat the runs:",
         comparison.model.name, comparison.settings.seconds, comparison.settings.seed
     )));
     let items = Variant::ALL.map(|variant| comparison.command_line(variant)).to_vec();
     blocks.push(Block::List { numbered: false, items });
     let rows = comparison.provenances();
     if !rows.is_empty() {
-        blocks.push(Block::paragraph(format!("In the ledger of the session: {}.", rows.join("; "))));
+        blocks.push(Block::paragraph(format!("Runs: {}.", rows.join("; "))));
     }
     blocks.push(Block::part("The model"));
     let lines = comparison.model.to_toml();
@@ -113,7 +113,7 @@ fn statistics(comparison: &Comparison, range_s: [f64; 2]) -> Option<Table> {
         ),
         columns,
         rows: comparison.signals(false).iter().enumerate().map(row).collect(),
-        note: "Range, mean and standard deviation of what was recorded; factor of the first run over the second."
+        note: "Range, mean and standard deviation of the recorded signals; ratio of the first run to the second."
             .to_owned(),
     })
 }

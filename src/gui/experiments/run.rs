@@ -3,8 +3,7 @@
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use flqr_core::identify::Motor;
-use flqr_core::model_file::{Model, Rig};
+use flqr_core::model::{Model, Motor, Rig};
 use flqr_core::record::{BenchSample, Log, Sample};
 use flqr_core::simulate::{
     self, BenchRun, ControllerChoice, Experiment, ExperimentError, Fall, Outcome, Run, Scenario, SpeedGains,
@@ -17,7 +16,7 @@ use crate::shell_word::quoted;
 pub(super) const LONGEST_S: f64 = 600.0;
 pub(super) const SHORTEST_S: f64 = 0.1;
 
-/// What both runs are made with; plain data, apart from their results.
+/// Settings of both runs.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Settings {
     pub(super) scenario: Scenario,
@@ -118,9 +117,9 @@ impl Variant {
 #[derive(Debug)]
 pub(super) struct Recorded {
     outcome: Outcome,
-    /// Why the run ended early, if the motion did not stay finite.
+    /// Reason of an early end, if the motion became non-finite.
     problem: Option<String>,
-    /// Whether there is one shaft in place of two.
+    /// True if there is one shaft in place of two.
     single: bool,
     pub(super) time_s: Vec<f64>,
     /// One column for each of the signals.
@@ -147,7 +146,7 @@ impl Recorded {
         self.time_s.last().copied().unwrap_or(0.0)
     }
 
-    /// Where the core's own statistics begin, s.
+    /// Start of the core's statistics, s.
     pub(super) fn statistics_from_s(&self) -> f64 {
         match &self.outcome {
             Outcome::Ground(run) => run.statistics.from_s,
@@ -171,7 +170,7 @@ impl Recorded {
         if self.single { &[Motor::Left] } else { &[Motor::Left, Motor::Right] }
     }
 
-    /// How the motors followed a step of their target, where there was one.
+    /// Step responses of the motors, if any.
     pub(super) fn tracking(&self) -> Option<&[StepResponse]> {
         match &self.outcome {
             Outcome::Ground(_) => None,
@@ -179,7 +178,7 @@ impl Recorded {
         }
     }
 
-    /// Whether x stayed within the core's limit in the end; none in the air.
+    /// Returns whether x stayed within the core's limit in the end; none in the air.
     pub(super) fn settled(&self) -> Option<bool> {
         match &self.outcome {
             Outcome::Ground(run) => Some(run.statistics.settled),
@@ -187,7 +186,7 @@ impl Recorded {
         }
     }
 
-    /// Whether the robot fell at any time; none in the air.
+    /// Returns whether the robot fell at any time; none in the air.
     pub(super) fn fell(&self) -> Option<bool> {
         match &self.outcome {
             Outcome::Ground(run) => Some(run.statistics.fell),
@@ -202,7 +201,7 @@ impl Recorded {
         }
     }
 
-    /// Where and how the robot fell, or what else ended the run early, as a sentence.
+    /// Describes a fall or another early end in one sentence.
     pub(super) fn failure(&self) -> Option<String> {
         if let Some(problem) = &self.problem {
             return Some(format!("{problem}."));
@@ -215,12 +214,12 @@ impl Recorded {
         Some(text.replace('-', "−"))
     }
 
-    /// What was known before the run.
+    /// Warnings known before the run.
     pub(super) fn warnings(&self) -> &[String] {
         self.outcome.warnings()
     }
 
-    /// Where the robot truly was, every 10 ms; nothing in the air.
+    /// True position of the robot, every 10 ms; empty in the air.
     pub(super) fn poses(&self) -> &[TimedPose] {
         match &self.outcome {
             Outcome::Ground(run) => &run.poses,
@@ -228,7 +227,7 @@ impl Recorded {
         }
     }
 
-    /// Where the robot is to go and stand, m; none where it is to stay or to come back.
+    /// Position setpoint, m; `None` if it stays or returns.
     pub(super) fn target_x_m(&self) -> Option<f64> {
         match &self.outcome {
             Outcome::Ground(run) => Some(run.target_x_m).filter(|target| *target != 0.0),
@@ -273,13 +272,13 @@ fn bench_columns(run: &BenchRun, single: bool) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// How a run ended.
+/// Outcome of a run.
 #[derive(Debug)]
 pub(super) enum End {
     Complete(Box<Recorded>),
     /// The user stopped it.
     Cancelled,
-    /// It could not be made; one sentence says why and the mend.
+    /// It could not be made; one sentence says why and the remedy.
     Refused(String),
 }
 
@@ -306,7 +305,7 @@ pub(super) fn run(
     }
 }
 
-/// What is known before a run, in sentences, or why there can be none.
+/// Checks before a run, in sentences, or why there can be none.
 pub(super) fn check(settings: &Settings, variant: Variant, model: &Model) -> Result<Vec<String>, String> {
     settings.experiment(variant).check(model, model).map_err(|problem| problem.to_string())
 }

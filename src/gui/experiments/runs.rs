@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::{Arc, OnceLock};
 
-use flqr_core::model_file::{Model, Rig};
+use flqr_core::model::{Model, Rig};
 use flqr_core::simulate::Summary;
 
 use super::run::{End, Recorded, Settings, Variant, command_line, run};
@@ -11,7 +11,7 @@ use super::signals::{Signal, signals};
 use crate::job::{Job, Outcome, Reporter, Waker};
 use crate::runs::Run;
 
-/// What the last two runs were made with, and what came of them.
+/// Settings and results of the last two runs.
 #[derive(Debug)]
 pub(super) struct Comparison {
     pub(super) settings: Settings,
@@ -42,12 +42,12 @@ impl Comparison {
 }
 
 impl Comparison {
-    /// Where the core's own statistics begin, s.
+    /// Start of the core's statistics, s.
     pub(super) fn statistics_from_s(&self) -> f64 {
         self.recorded().map(|(_, run)| run.statistics_from_s()).fold(0.0, f64::max)
     }
 
-    /// What is plotted and summed up.
+    /// Plotted signals.
     pub(super) fn signals(&self, degrees: bool) -> Vec<Signal> {
         let shafts = if matches!(self.model.rig, Rig::Axis(_)) { 1 } else { 2 };
         signals(self.settings.scenario.on_ground(), shafts, degrees)
@@ -65,7 +65,7 @@ impl Comparison {
         Variant::ALL.into_iter().zip(&self.runs).filter_map(failure).collect()
     }
 
-    /// What was known before the runs, each once with the names of its controllers.
+    /// Warnings before the runs, each once with its controllers.
     pub(super) fn warnings(&self) -> Vec<(String, String)> {
         let mut all: Vec<(String, String)> = Vec::new();
         for (variant, run) in self.recorded() {
@@ -85,7 +85,7 @@ impl Comparison {
         command_line(&self.settings, variant, self.model_path.as_deref())
     }
 
-    /// The core's statistics of both runs over a range; none where a run has no sample in it.
+    /// The core's statistics of both runs over a range; `None` if a run has no sample in it.
     pub(super) fn statistics_between(&self, range_s: [f64; 2]) -> [Option<Vec<Summary>>; 2] {
         [0, 1].map(|index| self.runs[index].as_ref().ok()?.statistics_between(range_s))
     }
@@ -164,8 +164,8 @@ impl Runs {
         let ended = ended.map(|end| end.expect("both have just been found"));
         if ended.iter().any(|end| matches!(end, End::Cancelled)) {
             return Some(match self.comparison {
-                Some(_) => "Cancelled: the results of before are still shown.".to_owned(),
-                None => "Cancelled: there is no result.".to_owned(),
+                Some(_) => "Cancelled. The previous results are still shown.".to_owned(),
+                None => "Cancelled without a result.".to_owned(),
             });
         }
         let runs = ended.map(|end| match end {
@@ -194,7 +194,7 @@ impl Running {
         self.ended[index] = match outcome {
             Outcome::Running => None,
             Outcome::Done(end) => Some(end),
-            Outcome::Broken => Some(End::Refused("The run failed: this is a defect of flqr".to_owned())),
+            Outcome::Broken => Some(End::Refused("The run failed: this is an internal error".to_owned())),
         };
         if self.ended[index].is_some() {
             self.shares[index] = 1.0;

@@ -16,15 +16,15 @@ use crate::save_form::{FileKind, Layout, SaveForm, Target, Words};
 use crate::widgets::hint_ui;
 use crate::write_file::{Files, bytes};
 
-/// What is saved.
+/// Format.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum SavedAs {
     /// CSV, one file a run and, in the air, a motor.
     #[default]
     Logs,
-    /// PNG of plots, robot and statistics as they are shown.
+    /// PNG picture of the page.
     Picture,
-    /// SVG of the plots over the visible time.
+    /// SVG of the plots in the visible range.
     Plots,
     /// HTML with everything.
     Report,
@@ -32,9 +32,9 @@ pub(crate) enum SavedAs {
 
 impl FileKind for SavedAs {
     const ALL: &'static [(Self, &'static str, &'static str)] = &[
-        (Self::Logs, "Logs", "CSV as every command reads it: one file a run"),
-        (Self::Picture, "Picture", "PNG of plots, robot and statistics as they are shown"),
-        (Self::Plots, "Plots", "SVG of the plots over the visible time"),
+        (Self::Logs, "Logs", "CSV logs, one file per run"),
+        (Self::Picture, "Picture", "PNG picture of the page"),
+        (Self::Plots, "Plots", "SVG of the plots in the visible range"),
         (Self::Report, "Report", "HTML with plots, statistics, model and commands"),
     ];
 
@@ -60,7 +60,7 @@ impl SavedAs {
     }
 }
 
-/// What is written, apart from the comparison.
+/// Output options besides the comparison.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Extent {
     /// Of the statistics, s.
@@ -70,7 +70,7 @@ pub(super) struct Extent {
 }
 
 const WORDS: Words<SavedAs> = Words {
-    path: ["path to save to", "The ending says what is saved: .csv, .png, .svg or .html (Ctrl+L comes here)"],
+    path: ["path to save to", "The file extension selects the format: .csv, .png, .svg or .html (Ctrl+L)"],
     save: |_| "Save runs",
 };
 
@@ -96,7 +96,7 @@ pub(super) fn start(
 pub(super) fn ui(form: &mut SaveForm<SavedAs>, context: &ViewContext<'_>, ui: &mut Ui) {
     let hint = |ui: &mut Ui, saved_as| {
         if saved_as == SavedAs::Logs {
-            hint_ui(ui, "Names of the controllers are added to the file's name.");
+            hint_ui(ui, "The controller names are appended to the file name.");
         }
     };
     let asked = form.ui(&WORDS, Layout::Column, hint, ui);
@@ -108,7 +108,7 @@ pub(super) fn ui(form: &mut SaveForm<SavedAs>, context: &ViewContext<'_>, ui: &m
     }
 }
 
-/// What goes where.
+/// Output files.
 fn files(saved_as: SavedAs, path: &Path, comparison: &Comparison, extent: Extent) -> Result<Files, String> {
     let one = |text: String| vec![(path.to_owned(), bytes(text))];
     Ok(match saved_as {
@@ -134,7 +134,7 @@ fn logs(path: &Path, comparison: &Comparison) -> Result<Files, String> {
     Ok(files)
 }
 
-/// Where the log of a controller goes; the rest of the name may have points in it.
+/// Path of the log of a controller; the name may contain dots.
 fn log_path(path: &Path, controller: &str, suffix: &str) -> PathBuf {
     let mut name = path.file_stem().unwrap_or_default().to_owned();
     name.push(format!("-{controller}{suffix}.csv"));

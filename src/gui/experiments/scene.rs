@@ -1,14 +1,14 @@
-//! Where things are in the side view: a plane seen from the robot's right, x to the right, z upward.
+//! Geometry of the side view: a plane seen from the robot's right, x to the right, z upward.
 //!
 //! The way along the ground is drawn as horizontal distance, which lengthens a ramp of 10° by 1.5 %.
 
 use egui::{Pos2, Rect, Vec2, pos2, vec2};
-use flqr_core::robot::RobotParameters;
-use flqr_core::simulate::{Ground, Pose};
+use flqr_core::model::{Ground, RobotParameters};
+use flqr_core::simulate::Pose;
 
 /// Width of the body over its height, as it is drawn.
 const BODY_ASPECT: f64 = 0.6;
-/// Free height over the robot and depth of the ground, as shares of the robot's height.
+/// Free height over the robot and depth of the ground, as fractions of the robot's height.
 const MARGIN_TOP: f64 = 0.25;
 const MARGIN_BOTTOM: f64 = 0.3;
 /// The robot may be this much smaller than it could be, so that the whole travel is seen;
@@ -20,7 +20,7 @@ const FOLLOWING_SCALE: f64 = 0.55;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Camera {
     rect: Rect,
-    /// What is in the middle at the bottom, m.
+    /// Point at the bottom centre, m.
     center_m: f64,
     bottom_m: f64,
     /// Points per metre.
@@ -29,7 +29,7 @@ pub(super) struct Camera {
     slope: (f64, f64),
 }
 
-/// What the picture is to show.
+/// Contents of the picture.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Subject {
     /// Least and greatest x of all runs, m.
@@ -57,7 +57,7 @@ impl Camera {
         Self { rect, center_m, bottom_m, scale, slope: subject.slope_rad.sin_cos() }
     }
 
-    /// Where a point is: `x` along and `z` above the plane of the ground.
+    /// Position of a point: `x` along and `z` above the plane of the ground.
     pub(super) fn at(&self, x: f64, z: f64) -> Pos2 {
         let (sin, cos) = self.slope;
         let along = x - self.center_m;
@@ -171,8 +171,8 @@ pub(super) fn spoke(radius: f32, turn_rad: f64) -> Vec2 {
 
 #[cfg(test)]
 mod tests {
+    use flqr_core::model::State;
     use flqr_core::model_file::presets;
-    use flqr_core::robot::State;
 
     use super::*;
 

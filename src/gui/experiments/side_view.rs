@@ -1,8 +1,8 @@
 //! The robot from its right side at the cursor's time: body, wheels, ground, and the axle's way until then.
 
 use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Sense, Shape, Stroke, Ui, Vec2};
-use flqr_core::robot::RobotParameters;
-use flqr_core::simulate::{Ground, Pose};
+use flqr_core::model::{Ground, RobotParameters};
+use flqr_core::simulate::Pose;
 
 use super::run::Recorded;
 use super::scene::{Camera, Figure, Subject, outline, robot_height_m, ruler, spoke};
@@ -19,7 +19,7 @@ pub(super) fn pose_at(run: &Recorded, time_s: f64) -> Option<usize> {
     (!run.poses().is_empty()).then(|| after.saturating_sub(1))
 }
 
-/// What both pictures show, so that they have one scale.
+/// Common range of both pictures.
 pub(super) fn subject<'a>(
     runs: impl Iterator<Item = &'a Recorded>,
     parameters: &RobotParameters,
@@ -119,7 +119,7 @@ impl Scene {
         self.painter.text(end, Align2::RIGHT_BOTTOM, "m", font, self.text);
     }
 
-    /// Where the robot is to stand in the end.
+    /// Final position setpoint.
     fn target(&self, x: f64, height: f64) {
         let line = [self.at([x, 0.0]), self.at([x, 1.15 * height])];
         self.painter.add(Shape::dashed_line(

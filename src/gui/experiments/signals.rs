@@ -1,4 +1,4 @@
-//! What is plotted and summed up of a run, in the order of its columns.
+//! Plotted signals of a run, in the order of its columns.
 
 use crate::history::Channel;
 use crate::plot::Unit;
@@ -12,7 +12,7 @@ pub(super) struct Signal {
     pub(super) quantity: Quantity,
     /// Unit of its values.
     pub(super) unit: Unit,
-    /// Whether the target speed belongs into its plot.
+    /// True if the target speed belongs into its plot.
     pub(super) has_target: bool,
 }
 

@@ -16,7 +16,7 @@ pub(super) enum Choice {
     /// Those that the command counts: after 15 s, in the air all.
     #[default]
     Usual,
-    /// What the plots show.
+    /// Range shown in the plots.
     Visible,
     /// From one time to another, s.
     Chosen([f64; 2]),
@@ -60,7 +60,7 @@ impl StatisticsTable {
         self.choice_ui(ui, comparison, marks);
         let statistics = self.statistics(comparison, marks.range);
         if statistics.iter().all(Option::is_none) {
-            hint_ui(ui, "There is no sample in this range.");
+            hint_ui(ui, "No sample in this range.");
         }
         let grid = Grid::new("statistics").num_columns(4).striped(true).min_row_height(15.0);
         grid.spacing([13.0, 2.0]).show(ui, |ui| {
@@ -86,12 +86,12 @@ impl StatisticsTable {
             let usual = if from > 0.0 { format!("after {from} s") } else { "whole run".to_owned() };
             ui.scope(|ui| {
                 let choices = [
-                    (Choice::Usual, &*usual, "As the command and the paper's tables count"),
-                    (Choice::Visible, "visible", "What the plots show"),
+                    (Choice::Usual, &*usual, "Same range as the command line and the paper's tables"),
+                    (Choice::Visible, "visible", "Range shown in the plots"),
                     (
                         Choice::Chosen(marks.range),
                         "chosen",
-                        "From and to, or a drag with Shift on a plot; its ends can be dragged",
+                        "Start and end; also set by dragging with Shift on a plot",
                     ),
                 ];
                 if choice_ui(ui, &mut choice, &choices) {
@@ -110,7 +110,7 @@ impl StatisticsTable {
     }
 }
 
-/// How the motors followed a step of their target, as the paper's Figures 6 and 7 show.
+/// Step responses of the motors, as in Figures 6 and 7 of the paper.
 pub(super) fn tracking_ui(ui: &mut Ui, comparison: &Comparison) {
     let responses = [0, 1].map(|run: usize| comparison.runs[run].as_ref().ok()?.tracking());
     let motors = responses.iter().flatten().map(|motors| motors.len()).max().unwrap_or(0);
@@ -155,11 +155,12 @@ fn head_ui(ui: &mut Ui, comparison: &Comparison) {
         let title = variant.title(comparison.settings.scenario);
         ui.label(RichText::new(title).small().strong().color(colors[variant as usize]));
     }
-    hint_ui(ui, "factor").on_hover_text("Of the first run over the second: above 1 is better");
+    hint_ui(ui, "factor")
+        .on_hover_text("Ratio of the first run to the second; above 1, the second is better");
     ui.end_row();
 }
 
-/// Whether each run settled, on the ground; said of the whole run, whatever the range.
+/// Returns whether each run settled, on the ground; said of the whole run, whatever the range.
 fn verdict_ui(ui: &mut Ui, comparison: &Comparison) {
     let verdicts = [0, 1].map(|run: usize| {
         let run = comparison.runs[run].as_ref().ok()?;
@@ -172,9 +173,8 @@ fn verdict_ui(ui: &mut Ui, comparison: &Comparison) {
     if verdicts.iter().all(Option::is_none) {
         return;
     }
-    row_ui(ui, "settled", verdicts.map(|verdict| verdict.map(str::to_owned)), None).on_hover_text(
-        "Whether x stayed within 0.05 m over the last 10 s of the run; one that fell or is shorter did not settle",
-    );
+    row_ui(ui, "settled", verdicts.map(|verdict| verdict.map(str::to_owned)), None)
+        .on_hover_text("Settled: peak to peak of x below 0.05 m over the last 10 s of the run");
 }
 
 fn rows_ui(ui: &mut Ui, quantity: &Quantity, pair: [Option<Summary>; 2]) {
@@ -203,7 +203,7 @@ fn row_ui(ui: &mut Ui, name: &str, values: [Option<String>; 2], factor: Option<f
     name
 }
 
-/// How much larger a value is in the first run than in the second.
+/// Ratio of a value in the first run to the second.
 pub(super) fn factor(pair: [Option<Summary>; 2], value: fn(&Summary) -> f64) -> Option<f64> {
     let [plain, compensated] = [pair[0]?, pair[1]?].map(|summary| value(&summary));
     (compensated > 0.0).then_some(plain / compensated)

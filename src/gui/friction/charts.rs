@@ -18,7 +18,7 @@ const POINTS_PER_SIDE: usize = 300;
 pub(super) fn ui(context: &ViewContext<'_>, fit: &FitRun, kind: Option<LogKind>, ui: &mut Ui) {
     section_ui(ui, "Fitted", |_| {});
     if fit.report.is_none() && kind == Some(LogKind::LinearAxis) {
-        hint_ui(ui, "A linear axis is fitted from its motion: start the fit to see how well it agrees.");
+        hint_ui(ui, "A linear axis is fitted from its motion. Start the fit to compare.");
         return;
     }
     let height = ui.available_height();

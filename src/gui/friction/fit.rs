@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use egui::{ProgressBar, RichText, TextEdit, Ui};
 use flqr_core::friction::{Stribeck, StribeckParameters};
-use flqr_core::identify::{Bounds, FitError, FitOptions, FitProgress, FitReport, Method, Motor, fit};
-use flqr_core::model_file::{AxisParameters, Model, Rig};
+use flqr_core::identify::{Bounds, FitError, FitOptions, FitProgress, FitReport, Method, fit};
+use flqr_core::model::{AxisParameters, Model, Motor, Rig};
 use flqr_core::record::{Log, LogKind, Mapping};
 
 use super::fitted::Fitted;
@@ -38,7 +38,7 @@ pub(super) struct FitRun {
     bounds: Bounds,
     seed: u64,
     estimate: String,
-    /// Whether parameters that are not estimated are held at the open model's values.
+    /// True if parameters that are not estimated are held at the open model's values.
     from_model: bool,
     /// `from_model` of the fit that runs or has ended.
     pub(super) held: bool,
@@ -47,7 +47,7 @@ pub(super) struct FitRun {
     pub(super) convergence: Vec<[f64; 2]>,
     last_step: Option<Step>,
     pub(super) report: Option<FitReport>,
-    /// How a fit from motion agrees with the log.
+    /// Comparison of a fit from motion with the log.
     pub(super) motion: Option<MotionChart>,
     made_with: Option<MadeWith>,
     /// The row of a fit that has ended, until the ledger takes it.
@@ -80,11 +80,11 @@ impl Default for FitRun {
     }
 }
 
-/// What a fit is made with, for its row in the ledger.
+/// Settings of a fit, for its row of the Runs page.
 struct MadeWith {
     log: Arc<Log>,
     model: Option<Model>,
-    /// Where there is a choice of one.
+    /// Motor, if there is a choice.
     motor: Option<Motor>,
     options: FitOptions,
     command: Option<String>,
@@ -121,7 +121,8 @@ fn fitting_model(kind: Option<LogKind>, model: Model) -> Option<Model> {
     (linear_model == (kind == Some(LogKind::LinearAxis))).then_some(model)
 }
 
-/// Whether there is a left and a right motor to choose from: in the log, or in the model beside the log of one.
+/// Returns whether there is a left and a right motor to choose from: in the log, or in the model next to the log of
+/// one.
 fn has_motors(kind: Option<LogKind>, rig: &Rig) -> bool {
     match kind {
         Some(LogKind::Robot) => true,
@@ -130,7 +131,7 @@ fn has_motors(kind: Option<LogKind>, rig: &Rig) -> bool {
     }
 }
 
-/// Why there is no fit.
+/// Reason why there is no fit.
 fn refusal(error: &FitError) -> Said {
     let is_asked = matches!(error, FitError::Cancelled { .. });
     (if is_asked { Severity::Note } else { Severity::Error }, error.to_string())
@@ -177,7 +178,7 @@ impl FitRun {
                 .map_err(|error| refusal(&error))?;
             Ok((report, Sources::new(model.as_ref(), [&*log])))
         };
-        self.job = Some(Job::start("fit", waker, work).map_err(|e| format!("No thread for the fit: {e}."))?);
+        self.job = Some(Job::start("fit", waker, work).map_err(|e| format!("Cannot start the fit: {e}."))?);
         self.made_with = Some(made_with);
         Ok(())
     }
@@ -226,7 +227,9 @@ impl FitRun {
         let result = match outcome {
             Outcome::Running => return None,
             Outcome::Done(result) => result,
-            Outcome::Broken => Err((Severity::Error, "The fit failed: this is a defect of flqr.".to_owned())),
+            Outcome::Broken => {
+                Err((Severity::Error, "The fit failed: this is an internal error.".to_owned()))
+            }
         };
         self.job = None;
         Some(match result {
@@ -272,12 +275,12 @@ impl FitRun {
         Stribeck::new(parameters?).ok()
     }
 
-    /// What goes into a model: the result, or the best so far.
+    /// Values used in a model: the result, or the best so far.
     pub(super) fn fitted(&self) -> Result<Fitted, String> {
         if let Some(report) = &self.report {
             return Fitted::of(report);
         }
-        let curve = self.curve().ok_or("There is no fitted curve yet: let a fit end.")?;
+        let curve = self.curve().ok_or("There is no fitted curve yet. Run a fit to the end.")?;
         Ok(Fitted::Rotary { curve, inertia_kg_m2: None, gravity_torque_nm: None })
     }
 
@@ -325,8 +328,7 @@ impl FitRun {
         if motors {
             ui.label("motor");
             ui.horizontal(|ui| {
-                let help =
-                    "Of a log of both motors, the one to fit; and the one whose curve is drawn beside it";
+                let help = "For a log of both motors: the motor to fit and to compare with";
                 let choices = [(Motor::Left, "left", help), (Motor::Right, "right", help)];
                 choice_ui(ui, &mut self.motor, &choices);
             });
@@ -335,8 +337,12 @@ impl FitRun {
         ui.label("method");
         ui.horizontal(|ui| {
             let choices = [
-                (Method::Best, "swarm and polish", "Particle swarm, then a polish to the true optimum"),
-                (Method::Pso, "swarm alone", "Particle swarm exactly as the paper's Algorithm 1"),
+                (
+                    Method::Best,
+                    "PSO + local refinement",
+                    "Particle swarm optimization followed by local refinement",
+                ),
+                (Method::Pso, "PSO only", "Particle swarm optimization as in Algorithm 1 of the paper"),
             ];
             choice_ui(ui, &mut self.method, &choices);
         });
@@ -344,26 +350,26 @@ impl FitRun {
         ui.label("bounds");
         ui.horizontal(|ui| {
             let choices = [
-                (Bounds::Data, "from the data", "Bounds that the measured torques and speeds suggest"),
-                (Bounds::Paper, "the paper's", "Table 3 as printed; known to fail for motors this small"),
+                (Bounds::Data, "from the data", "Bounds from the measured torques and speeds"),
+                (Bounds::Paper, "the paper's", "Table 3 as printed; excludes the optimum for small motors"),
             ];
             choice_ui(ui, &mut self.bounds, &choices);
         });
         ui.end_row();
         ui.label("seed");
         entry_ui(ui, &mut self.seed, "seed", |field| field)
-            .on_hover_text("Same log and same seed: same result");
+            .on_hover_text("The same log and seed give the same result");
         ui.end_row();
         ui.label("estimate");
         let field = TextEdit::singleline(&mut self.estimate).hint_text("default").desired_width(180.0);
         let field = ui.add(field).accessible_name("parameters to estimate");
         field.on_hover_text(
-            "Which parameters to free in a fit from motion: “all”, or names as in the model file, separated by commas. Empty: those that the log determines",
+            "Parameters to estimate in a fit from motion: “all”, or names as in the model file, separated by commas. Empty: all that the log identifies",
         );
         ui.end_row();
         ui.label("");
-        ui.checkbox(&mut self.from_model, "start from the open model")
-            .on_hover_text("Parameters that are not estimated are held at the model's values");
+        ui.checkbox(&mut self.from_model, "use the open model")
+            .on_hover_text("Parameters that are not estimated keep the model's values");
         ui.end_row();
     }
 

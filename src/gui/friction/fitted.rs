@@ -1,8 +1,8 @@
-//! What a fit puts into a model, and into which models it fits.
+//! Use of a fit in a model.
 
 use flqr_core::friction::{Stribeck, StribeckParameters};
 use flqr_core::identify::FitReport;
-use flqr_core::model_file::{AxisParameters, Rig};
+use flqr_core::model::{AxisParameters, Rig};
 
 use crate::command::Target;
 
@@ -51,7 +51,7 @@ impl Fitted {
         })
     }
 
-    /// Whether a model can have this.
+    /// Returns whether a model can have this.
     ///
     /// # Errors
     /// A sentence where the units are of the other kind of axis.
@@ -61,10 +61,10 @@ impl Fitted {
         let problem = match (self, model_is_linear) {
             (Self::Linear { .. }, true) | (Self::Rotary { .. }, false) => return Ok(()),
             (Self::Linear { .. }, false) => {
-                "This fit is of a linear axis, in N and m/s, and the model has N m and rad/s: open the model of a linear axis."
+                "This fit is of a linear axis (N, m/s), but the model uses N m and rad/s. Open the model of a linear axis."
             }
             (Self::Rotary { .. }, true) => {
-                "This fit is of a motor, in N m and rad/s, and the model is a linear axis: open the model of a robot or a motor."
+                "This fit is of a motor (N m, rad/s), but the model is a linear axis. Open the model of a robot or a motor."
             }
         };
         Err(problem.to_owned())
@@ -85,18 +85,18 @@ impl Fitted {
                     robot.friction[1] = Some(curve);
                 }
                 return Ok(match target {
-                    Target::Left => "The left motor has the fitted friction, the simulated robot too.",
-                    Target::Right => "The right motor has the fitted friction, the simulated robot too.",
-                    Target::Both => "Both motors have the fitted friction, the simulated robot too.",
+                    Target::Left => "The fitted friction is used for the left motor.",
+                    Target::Right => "The fitted friction is used for the right motor.",
+                    Target::Both => "The fitted friction is used for both motors.",
                 });
             }
             (fitted, Rig::Axis(axis)) => {
                 fitted.put_into_axis(&mut axis.parameters);
                 // Those of the friction of before.
-                axis.friction_told_from = None;
+                axis.fitted_speed_range = None;
             }
         }
-        Ok("The axis has the fitted values.")
+        Ok("The fitted values are used for the axis.")
     }
 
     fn put_into_axis(self, axis: &mut AxisParameters) {
@@ -125,8 +125,7 @@ fn curve(report: &FitReport, keys: Keys) -> Result<Stribeck, String> {
     let [coulomb, viscous, offset, sticking, speed] = keys.map(value);
     let (Some(coulomb_nm), Some(viscous_nm_s_rad)) = (coulomb, viscous) else {
         return Err(
-            "This fit has no Coulomb and viscous friction, so there is nothing to put into the model: estimate them."
-                .to_owned(),
+            "This fit has no Coulomb and viscous friction. Estimate them to use it in the model.".to_owned()
         );
     };
     let parameters = StribeckParameters {
@@ -139,14 +138,14 @@ fn curve(report: &FitReport, keys: Keys) -> Result<Stribeck, String> {
     };
     Stribeck::new(parameters).map_err(|problem| {
         let key = ROTARY.iter().position(|&key| key == problem.name).map_or(problem.name, |i| keys[i]);
-        format!("The fitted {key} must be {} for the model to take it.", problem.allowed)
+        format!("The fitted {key} must be {} to be used in the model.", problem.allowed)
     })
 }
 
 fn above_0(key: &str, value: Option<f64>) -> Result<Option<f64>, String> {
     match value {
         Some(value) if !(value.is_finite() && value > 0.0) => {
-            Err(format!("The fitted {key} must be a finite number above 0 for the model to take it."))
+            Err(format!("The fitted {key} must be a finite number above 0 to be used in the model."))
         }
         other => Ok(other),
     }
@@ -155,7 +154,7 @@ fn above_0(key: &str, value: Option<f64>) -> Result<Option<f64>, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use flqr_core::model_file::{AxisModel, Model};
+    use flqr_core::model::{AxisModel, Model};
 
     /// The speeds that the friction of before came from are not those of the fit.
     #[test]
@@ -164,7 +163,7 @@ mod tests {
                     coulomb_nm = 0.03\nviscous_nm_s_rad = 0.0005\ntold_from_rad_s = [0.1, 10.5]\n";
         let mut model = Model::from_toml(text, "shaft.toml").unwrap();
         let told_from = |model: &Model| match &model.rig {
-            Rig::Axis(AxisModel { friction_told_from, .. }) => *friction_told_from,
+            Rig::Axis(AxisModel { fitted_speed_range, .. }) => *fitted_speed_range,
             Rig::Robot(_) => panic!("an axis was read"),
         };
         assert_eq!(told_from(&model), Some([0.1, 10.5]));

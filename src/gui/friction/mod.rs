@@ -11,7 +11,7 @@ mod source;
 use std::path::Path;
 
 use egui::Ui;
-use flqr_core::model_file::Model;
+use flqr_core::model::Model;
 
 use crate::column_map::ColumnMapForm;
 use crate::command::FilePurpose;
@@ -86,7 +86,7 @@ impl FrictionTab {
     ) -> Result<(), String> {
         let command = self.command_line(path).ok();
         let Some(loaded) = self.loader.log() else {
-            return Err("There is no log to fit: load one first.".to_owned());
+            return Err("There is no log to fit. Load one first.".to_owned());
         };
         self.fit.start(loaded, model, command, waker)
     }
@@ -95,14 +95,14 @@ impl FrictionTab {
         self.fit.cancel();
     }
 
-    /// Where the log came from.
+    /// Source of the log.
     pub(crate) fn log_path(&self) -> Option<&Path> {
         self.loader.log().map(|loaded| &*loaded.path)
     }
 
     /// The command that makes the fit of the loaded log.
     pub(crate) fn command_line(&self, model: Option<&Path>) -> Result<String, String> {
-        let log = self.log_path().ok_or("There is no log to fit: load one first.")?;
+        let log = self.log_path().ok_or("There is no log to fit. Load one first.")?;
         let map = self.source.column_map.parse()?;
         Ok(self.fit.command_line(log, map.entries(), model))
     }
@@ -115,7 +115,7 @@ impl FrictionTab {
         self.fit.is_running()
     }
 
-    /// What the last fit would put into a model, or why it has nothing for one.
+    /// Values of the last fit for a model, or the reason why there are none.
     pub(crate) fn fitted(&self) -> Result<Fitted, String> {
         self.fit.fitted()
     }

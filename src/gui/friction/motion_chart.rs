@@ -4,10 +4,11 @@ use egui::{Ui, Vec2, vec2};
 use egui_plot::{FilledArea, HLine, Line, MarkerShape, PlotPoint, PlotPoints, Points};
 use flqr_core::identify::FitReport;
 use flqr_core::identify::motion::MotionSeries;
+use flqr_core::signal::{Band, Bin, binned};
 
 use super::charts::chart;
 use crate::context::ViewContext;
-use crate::plot::{Band, Bin, Data, Panel, PanelCurve, Stack, Unit, binned, one_after_another};
+use crate::plot::{Data, Panel, PanelCurve, Stack, Unit, one_after_another};
 use crate::theme::palette;
 use crate::widgets::{hint_ui, legend_ui, section_ui, shown};
 
@@ -32,7 +33,7 @@ pub(super) struct MotionChart {
 }
 
 impl MotionChart {
-    /// None of a fit of pairs.
+    /// `None` for a fit of pairs.
     pub(super) fn new(report: &FitReport) -> Option<Self> {
         let MotionSeries { time_s, speed, measured, fitted } = report.series.as_ref()?;
         let (time_s, gap_s, _) = one_after_another(time_s);
@@ -74,9 +75,8 @@ impl MotionChart {
             ui.vertical(|ui| {
                 ui.set_width(0.4 * room.x);
                 self.over_speed_ui(vec2(0.4 * room.x, room.y - SUMMARY_HEIGHT), ui);
-                hint_ui(ui, self.summary()).on_hover_text(
-                    "Line: means over rows of neighbouring speeds; band: from their first to their third quartile",
-                );
+                hint_ui(ui, self.summary())
+                    .on_hover_text("Line: mean over rows of similar speed; band: interquartile range");
             });
         });
     }
@@ -133,13 +133,13 @@ impl MotionChart {
         });
     }
 
-    /// How far the means wander, as text beside the picture.
+    /// Spread of the means, as text next to the plot.
     fn summary(&self) -> String {
         let means = self.bins.iter().map(|bin| bin.mean);
         let (low, high) = means
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), mean| (low.min(mean), high.max(mean)));
         let span = shown(high - low, 3);
-        format!("means from peak to peak: {span} {}", self.unit)
+        format!("peak-to-peak of the means: {span} {}", self.unit)
     }
 }
 

@@ -1,4 +1,4 @@
-//! What is in the log: kind, rate, columns, first rows, and one column as a plot.
+//! Contents of the log: kind, rate, columns, first rows, and one column as a plot.
 
 use egui::{ComboBox, RichText, ScrollArea, Ui};
 
@@ -42,7 +42,7 @@ impl Preview {
             }
         });
         let Some(loaded) = loader.log() else {
-            let hint = "Open, type or drop a CSV file whose columns carry their units, such as:";
+            let hint = "Open a CSV file with units in its column names, or drop one here. Examples:";
             return empty_page_ui(ui, "No log yet.", hint, |ui| {
                 for columns in [
                     "time_s, motor_angle_rad, torque_nm",
@@ -86,7 +86,7 @@ impl Preview {
                 choice.on_hover_text(&column.name);
             }
         });
-        let help = format!("The quantity to show: now the column {key}");
+        let help = format!("Signal to show: column {key}");
         combo.response.on_hover_text(help).accessible_name("column");
     }
 
@@ -140,7 +140,7 @@ fn title(key: &str, ui: &Ui) -> String {
     }
 }
 
-/// Where the curve comes from, for exports: the log, and what was made of it.
+/// Source of the curve, for exports: the log, and what was made of it.
 pub(super) fn sources(loaded: &LoadedLog, row: Option<&Run>) -> Vec<String> {
     let log = format!("log {}, sources {}", loaded.path.display(), loaded.sources.hex());
     std::iter::once(log).chain(row.map(Run::provenance)).collect()

@@ -31,7 +31,7 @@ const NAMES: &[(&str, &str, &str)] = &[
 pub(super) fn ui(context: &ViewContext<'_>, fit: &FitRun, ui: &mut Ui) {
     section_ui(ui, "Result", |_| {});
     let Some(report) = &fit.report else {
-        hint_ui(ui, "The parameters appear here, each with its 95 % interval, once a fit has ended.");
+        hint_ui(ui, "The parameters with their 95 % intervals appear here after a fit.");
         return;
     };
     parameters_ui(report, fit.held, ui);
@@ -62,15 +62,16 @@ fn summary(report: &FitReport) -> String {
     )
 }
 
-/// What the fit says about the log, each once; the health of the log may say the same in a warning.
+/// Findings of the fit on the log, without duplicates of the data health.
 fn findings_ui(report: &FitReport, ui: &mut Ui) {
     for (index, finding) in report.data_health.iter().enumerate() {
         if report.data_health[..index].contains(finding) || report.warnings.contains(&finding.problem) {
             continue;
         }
         let column = if finding.column.is_empty() { String::new() } else { format!("{}: ", finding.column) };
-        let mend = if finding.mend.is_empty() { String::new() } else { format!(" → {}", finding.mend) };
-        let text = format!("{column}{}{mend}", finding.problem);
+        let remedy =
+            if finding.remedy.is_empty() { String::new() } else { format!(" → {}", finding.remedy) };
+        let text = format!("{column}{}{remedy}", finding.problem);
         match finding.severity {
             Severity::Info => hint_ui(ui, text),
             Severity::Warning | Severity::Error => warning_ui(ui, text),
@@ -134,7 +135,7 @@ fn use_ui(context: &ViewContext<'_>, fit: &FitRun, ui: &mut Ui) {
     ui.horizontal(|ui| {
         for (target, name) in targets {
             let button = ui.add_enabled(problem.is_none(), egui::Button::new(*name));
-            let help = "Put the fitted values into the model; the simulated robot gets them at once";
+            let help = "Use the fitted values in the model; the simulated robot uses them immediately";
             if button.on_hover_text(help).clicked() {
                 context.commands.send(Command::UseFit(*target));
             }

@@ -1,4 +1,4 @@
-//! Where the log comes from: path, dialog, recent files, drop; and what is wrong with it.
+//! Source of the log: path, dialog, recent files, drop; and what is wrong with it.
 
 use std::path::PathBuf;
 
@@ -11,7 +11,7 @@ use crate::health_card::{log_ui, progress_ui};
 use crate::load::Loader;
 use crate::widgets::{error_ui, hint_ui, section_ui, warning_ui};
 
-/// What has been typed.
+/// Typed text.
 pub(super) struct SourceForm {
     pub(super) path: String,
     pub(super) column_map: ColumnMapForm,
@@ -37,7 +37,7 @@ impl SourceForm {
         if let Some(problem) = &loader.problem {
             error_ui(ui, problem);
             if loader.log().is_some() {
-                hint_ui(ui, "The log of before is still there.");
+                hint_ui(ui, "The previous log is still loaded.");
             }
         }
         progress_ui(loader, ui);
@@ -52,7 +52,7 @@ impl SourceForm {
             field.request_focus();
         }
         let entered = field.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
-        field.on_hover_text("Type a path and press Enter to load it (Ctrl+L comes here)");
+        field.on_hover_text("Type a path and press Enter to load it (Ctrl+L)");
         entered
     }
 
@@ -61,7 +61,7 @@ impl SourceForm {
         if ui.button("Open…").on_hover_text("Choose a log (Ctrl+O)").clicked() {
             context.commands.send(Command::ShowDialog(FilePurpose::OpenLog));
         }
-        let help = "Load the path above with the column map above";
+        let help = "Load this path with the column map above";
         let load = ui.add_enabled(typed, egui::Button::new("Load")).on_hover_text(help);
         if load.clicked() || (entered && typed) {
             context.commands.send(Command::LoadLog(PathBuf::from(self.path.trim())));
@@ -84,7 +84,7 @@ impl SourceForm {
     }
 }
 
-/// What is wrong with the log, and the mend.
+/// Problems of the log and their remedies.
 pub(super) fn health_ui(loader: &Loader, ui: &mut Ui) {
     let Some(loaded) = loader.log() else { return };
     section_ui(ui, "Data health", |_| {});

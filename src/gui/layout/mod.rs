@@ -1,4 +1,4 @@
-//! Which pages are beside, below and behind each other.
+//! Which pages are next to, below and behind each other.
 
 mod node;
 
@@ -33,7 +33,7 @@ impl Layout {
         self.tree.make_active(|_, tile| matches!(tile, Tile::Pane(pane) if *pane == tab));
     }
 
-    /// Gives a page a tile of its own, or takes it back to the others.
+    /// Gives a page a separate tile, or takes it back to the others.
     pub(crate) fn move_tab(&mut self, tab: Tab, side: Side) {
         self.set_node(&self.node().moved(tab, side));
         self.select(tab);
@@ -41,21 +41,21 @@ impl Layout {
 
     /// The layout as data.
     pub(crate) fn node(&self) -> Node {
-        self.tree.root().map_or_else(Node::default, |root| node_of(&self.tree.tiles, root)).mended()
+        self.tree.root().map_or_else(Node::default, |root| node_of(&self.tree.tiles, root)).fixed()
     }
 
     /// Takes over a layout; whatever is wrong with it, every page is in it once.
     pub(crate) fn set_node(&mut self, node: &Node) {
-        self.tree = tree_of(&node.mended());
+        self.tree = tree_of(&node.fixed());
     }
 
-    /// Whether there is more than one tile.
+    /// Returns whether there is more than one tile.
     pub(crate) fn is_split(&self) -> bool {
         let is_tabs = |tile: &&Tile<Tab>| matches!(tile, Tile::Container(Container::Tabs(_)));
         self.tree.tiles.tiles().filter(is_tabs).count() > 1
     }
 
-    /// Whether a page is in view.
+    /// Returns whether a page is in view.
     pub(crate) fn shows(&self, tab: Tab) -> bool {
         self.shown.contains(&tab)
     }
@@ -75,7 +75,7 @@ impl Layout {
     }
 }
 
-/// What the tiles ask for while they are drawn.
+/// Requests of the tiles while they are drawn.
 struct Pages<'a> {
     draw: &'a mut dyn FnMut(Tab, &mut Ui),
     split: bool,
@@ -119,7 +119,7 @@ impl Behavior<Tab> for Pages<'_> {
         if response.clicked() {
             self.turned_to = tiles.get_pane(&tile).copied();
         }
-        response.on_hover_text("Drag it to another tile, or to the edge of one")
+        response.on_hover_text("Drag to another tile, or to the edge of one")
     }
 
     fn gap_width(&self, _: &egui::Style) -> f32 {

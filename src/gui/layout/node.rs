@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use crate::tab::Tab;
 
-/// Where a page goes.
+/// Position of a page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Side {
     Right,
@@ -41,7 +41,7 @@ const DEEPEST: usize = 12;
 pub(crate) enum Node {
     /// Pages behind each other.
     Tabs { tabs: Vec<Tab>, active: Option<Tab> },
-    /// Parts beside or below each other.
+    /// Parts next to or below each other.
     Split { below: bool, shares: Vec<f32>, children: Vec<Node> },
 }
 
@@ -52,7 +52,7 @@ impl Default for Node {
 }
 
 impl Node {
-    /// With `tab` in a tile of its own at a side of all others, or behind the first of the others.
+    /// With `tab` in a separate tile at a side of all others, or behind the first of the others.
     pub(crate) fn moved(&self, tab: Tab, side: Side) -> Self {
         let mut seen = vec![tab];
         let Some(rest) = self.without(&mut seen) else { return self.clone() };
@@ -81,7 +81,7 @@ impl Node {
     }
 
     /// With every page in it once, and nothing empty.
-    pub(crate) fn mended(&self) -> Self {
+    pub(crate) fn fixed(&self) -> Self {
         let mut seen = Vec::new();
         let Some(mut node) = self.without(&mut seen) else { return Self::default() };
         let missing: Vec<Tab> = Tab::ALL.into_iter().filter(|tab| !seen.contains(tab)).collect();
@@ -92,7 +92,7 @@ impl Node {
         node.in_order()
     }
 
-    /// Without the pages in `seen`, which gets those that are left; none where nothing is left.
+    /// Without the pages in `seen`, which gets those that are left; `None` if nothing is left.
     fn without(&self, seen: &mut Vec<Tab>) -> Option<Self> {
         match self {
             Self::Tabs { tabs, active } => {
@@ -138,7 +138,7 @@ impl Node {
         self
     }
 
-    /// Whether only the front pages differ.
+    /// Returns whether only the front pages differ.
     pub(crate) fn is_alike(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Tabs { tabs, .. }, Self::Tabs { tabs: others, .. }) => tabs == others,
@@ -170,10 +170,10 @@ impl Node {
         }
     }
 
-    /// From a file: what is of use of it, with every page once; none where nothing is.
+    /// From a file: what is of use of it, with every page once; `None` if nothing is.
     pub(crate) fn from_value(value: &Value) -> Option<Self> {
         let node = Self::read(value, DEEPEST)?;
-        node.without(&mut Vec::new()).map(|node| node.mended())
+        node.without(&mut Vec::new()).map(|node| node.fixed())
     }
 
     fn read(value: &Value, depth: usize) -> Option<Self> {

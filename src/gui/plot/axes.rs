@@ -15,13 +15,14 @@ pub(crate) struct Axes<'a> {
     /// Without one the horizontal axis is not drawn: the plot below has it.
     pub(crate) x_label: Option<&'a str>,
     pub(crate) y_label: &'a str,
-    /// Height of the plot with its horizontal axis, in points: where it is too low for the label, the unit is left of it.
+    /// Height of the plot with its horizontal axis, in points: where it is too low for the label, the unit is left of
+    /// it.
     pub(crate) height: f32,
     pub(crate) x_lines: f64,
     pub(crate) y_lines: f64,
 }
 
-/// What few plots have.
+/// Optional parts of a plot.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Extras {
     /// What is at the right; room is kept for it where only other plots of the stack have one.
@@ -30,7 +31,7 @@ pub(super) struct Extras {
     pub(super) logarithmic: bool,
 }
 
-/// What is at the right of a plot.
+/// Right axis of a plot.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) enum Right {
     /// The plot reaches to its edge.
@@ -63,7 +64,7 @@ impl SecondAxis {
         Self { label, color, first: middle(left, step), second: middle(range, own_step), scale }
     }
 
-    /// Where a value of this axis is on the first one.
+    /// Maps a value of this axis to the first one.
     pub(super) fn place(&self, value: f64) -> f64 {
         (value - self.second) / self.scale + self.first
     }

@@ -65,12 +65,12 @@ impl Chunks {
         true
     }
 
-    /// The same for as long as samples are only appended or dropped at the start.
+    /// Same for as long as samples are only appended or dropped at the start.
     pub(super) fn lineage(&self) -> u64 {
         self.lineage.0
     }
 
-    /// How many samples were dropped at the start.
+    /// Number of samples dropped at the start.
     pub(super) fn dropped(&self) -> usize {
         self.dropped
     }
@@ -183,7 +183,7 @@ impl TimeColumn {
         self.values.len()
     }
 
-    /// Whether there are none.
+    /// Returns whether there are none.
     pub fn is_empty(&self) -> bool {
         self.values.chunks.is_empty()
     }
@@ -203,7 +203,7 @@ impl TimeColumn {
         self.get(self.len().checked_sub(1)?)
     }
 
-    /// How many values are at most `limit`.
+    /// Number of values of at most `limit`.
     pub fn count_up_to(&self, limit: f64) -> usize {
         Values::Chunks(&self.values).partition_point(0..self.len(), |value| value <= limit)
     }

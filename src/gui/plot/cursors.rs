@@ -11,7 +11,7 @@ pub(super) const NAMES: [&str; 2] = ["A", "B"];
 /// Samples that a key moves a cursor by: plain, and with Shift.
 const STEPS: [(Modifiers, usize); 2] = [(Modifiers::SHIFT, 10), (Modifiers::NONE, 1)];
 
-/// Where the cursors are, and which one the keyboard moves.
+/// Positions of the cursors, and the one moved by the keyboard.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Cursors {
     pub(super) at: [f64; 2],

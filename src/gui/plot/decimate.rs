@@ -1,4 +1,4 @@
-//! What is drawn of a curve: the extremes of each pixel column, from its pyramid, so that cost and picture do not
+//! Drawn parts of a curve: the extremes of each pixel column, from its pyramid, so that cost and picture do not
 //! depend on how much data is behind them.
 //!
 //! Awkward values: a sample that is not finite, and a step in time longer than the gap limit, end a piece of
@@ -10,7 +10,7 @@ use std::ops::Range;
 use egui_plot::PlotPoint;
 
 use super::column::{Held, TimeColumn, ValueColumn, Values};
-use super::kept::Kept;
+use super::draw_cache::DrawCache;
 use super::pyramid::{Extremes, Gaps, Pyramid, Steps, Summary};
 
 /// Data of one curve.
@@ -26,7 +26,7 @@ pub struct Curve<'a> {
     pub gap: f64,
 }
 
-/// Where the data of a curve are.
+/// Data of a curve.
 #[derive(Clone, Copy, Debug)]
 pub enum Data<'a> {
     /// Columns that stay while their generation does: horizontal values and as many vertical ones.
@@ -36,7 +36,7 @@ pub enum Data<'a> {
 }
 
 impl Data<'_> {
-    /// The same for as long as what is there stays as it is, though more may come and the oldest go.
+    /// Same for as long as what is there stays as it is, though more may come and the oldest go.
     fn lineages(&self, generation: u64) -> [u64; 2] {
         match self {
             Self::Fixed(x, _) => [generation, x.len() as u64],
@@ -45,7 +45,7 @@ impl Data<'_> {
     }
 }
 
-/// What is visible of a curve.
+/// Visible parts of a curve.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Visible {
     /// Pieces of the line, gaps between them.
@@ -210,13 +210,13 @@ impl<'a> Indexed<'a> {
         Snapshot { x, y, scale: self.scale }
     }
 
-    /// What is drawn between `range[0]` and `range[1]` in a plot of `columns` pixels.
+    /// Returns the drawn parts between `range[0]` and `range[1]` in a plot of `columns` pixels.
     pub(super) fn visible(&self, range: [f64; 2], columns: usize) -> Visible {
-        self.visible_of(range, columns, &mut Kept::default(), [0; 4])
+        self.visible_of(range, columns, &mut DrawCache::default(), [0; 4])
     }
 
-    /// The same with what is `kept` of it; see [`Kept::draw`] for `of`.
-    fn visible_of(&self, range: [f64; 2], columns: usize, kept: &mut Kept, of: [u64; 4]) -> Visible {
+    /// Same with what is `kept` of it; see [`DrawCache::draw`] for `of`.
+    fn visible_of(&self, range: [f64; 2], columns: usize, kept: &mut DrawCache, of: [u64; 4]) -> Visible {
         let valid = range[0].is_finite() && range[1].is_finite() && range[1] > range[0] && columns > 0;
         if self.length == 0 || !valid {
             return Visible::default();
@@ -249,12 +249,12 @@ impl<'a> Indexed<'a> {
         &self.gaps
     }
 
-    /// How many samples the curve has lost at its start.
+    /// Number of samples dropped at the start of the curve.
     pub(super) fn dropped(&self) -> usize {
         self.dropped
     }
 
-    /// Both extremes of a range in their order; none where no sample is finite.
+    /// Both extremes of a range in their order; `None` if no sample is finite.
     pub(super) fn extremes(&self, range: Range<usize>) -> Option<[PlotPoint; 2]> {
         let found = self.gaps.pyramid.extremes(self.gaps.y, range)?;
         let low = PlotPoint::new(self.x(found.min_at), found.min * self.scale);
@@ -268,7 +268,7 @@ impl<'a> Indexed<'a> {
 pub struct DecimationCache {
     key: Option<(u64, [u64; 4], usize)>,
     visible: Visible,
-    kept: Kept,
+    kept: DrawCache,
     own: OwnPyramids,
 }
 
@@ -295,7 +295,7 @@ impl DecimationCache {
         self.visible_of(Data::Fixed(x, y), [scale, gap], generation, range, columns)
     }
 
-    /// The same of any data; `look` is the scale and the largest step that is no gap.
+    /// Same for any data; `look` is the scale and the largest step that is no gap.
     pub(super) fn visible_of(
         &mut self,
         data: Data<'_>,
@@ -315,7 +315,7 @@ impl DecimationCache {
         &self.visible
     }
 
-    /// What was visible when it was asked for last.
+    /// Last visible parts.
     pub(super) fn last_visible(&self) -> &Visible {
         &self.visible
     }

@@ -15,7 +15,7 @@ use crate::save_form::{FileKind, Layout, SaveForm, Target, Words, with_ending};
 use crate::widgets::{entry_ui, parse};
 use crate::write_file::{Content, Watch, bytes};
 
-/// What is saved of a figure.
+/// Format of a saved figure.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum FigureKind {
     /// The visible samples as a log.
@@ -29,13 +29,9 @@ pub enum FigureKind {
 
 impl FileKind for FigureKind {
     const ALL: &'static [(Self, &'static str, &'static str)] = &[
-        (
-            Self::Csv,
-            "CSV",
-            "The samples of the visible range, units in the header, as every command reads them",
-        ),
-        (Self::Svg, "SVG", "The visible range, drawn at the size that is given here"),
-        (Self::Png, "PNG", "The plots as they are on the screen"),
+        (Self::Csv, "CSV", "Samples of the visible range as a CSV log"),
+        (Self::Svg, "SVG", "The visible range, drawn at this size"),
+        (Self::Png, "PNG", "The plots as shown on the screen"),
     ];
 
     fn extension(self) -> &'static str {
@@ -52,7 +48,7 @@ impl FileKind for FigureKind {
 pub struct FigureFile {
     /// Name of the stack.
     pub stack: &'static str,
-    /// What is saved of it.
+    /// Format.
     pub kind: FigureKind,
 }
 
@@ -69,16 +65,16 @@ impl FigureFile {
     }
 }
 
-/// Where a stack finds what a dialog brought for it.
+/// Storage of the dialog result of a stack.
 fn answer_id(stack: &'static str) -> Id {
     Id::unique(("figure file", stack))
 }
 
-/// What a dialog brought for a figure.
+/// Dialog result for a figure.
 #[derive(Clone, Default)]
 struct Answer(Option<(FigureKind, Result<PathBuf, String>)>);
 
-/// What is to be written; `sources` say where the curves come from.
+/// Returns the file contents; `sources` describe the curves.
 pub(super) enum Figure {
     Log { x_key: &'static str, curves: Vec<(String, Snapshot)>, sources: Vec<String> },
     Chart(Box<Chart>, [f64; 2]),
@@ -86,7 +82,7 @@ pub(super) enum Figure {
 }
 
 const WORDS: Words<FigureKind> = Words {
-    path: ["figure path", "The ending says what is saved: .csv, .svg or .png"],
+    path: ["figure path", "The file extension selects the format: .csv, .svg or .png"],
     save: |kind| match kind {
         FigureKind::Csv => "Save data",
         FigureKind::Svg => "Save figure",
@@ -107,9 +103,9 @@ impl Default for Export {
     }
 }
 
-/// What the form asks for.
+/// Requests of the form.
 #[derive(Default)]
-pub(super) struct Asked {
+pub(super) struct ExportRequest {
     pub(super) save: Option<Target<FigureKind>>,
     pub(super) dialog: Option<FigureKind>,
 }
@@ -125,17 +121,17 @@ impl Export {
         (self.open, self.form.kind) = (true, kind);
     }
 
-    pub(super) fn ui(&mut self, ui: &mut Ui, stack: &'static str) -> Asked {
+    pub(super) fn ui(&mut self, ui: &mut Ui, stack: &'static str) -> ExportRequest {
         let id = answer_id(stack);
         let answer = ui.ctx().data_mut(|data| data.remove_temp::<Answer>(id)).and_then(|answer| answer.0);
-        let mut asked = Asked::default();
+        let mut request = ExportRequest::default();
         if let Some((kind, answer)) = answer {
             self.open_as(kind);
             match answer {
                 // The dialog has asked before replacing a file, though not about an ending added here.
                 Ok(path) => {
                     let replace = with_ending(path.clone(), kind) == path;
-                    asked.save = Some((kind, path, replace));
+                    request.save = Some((kind, path, replace));
                 }
                 Err(problem) => (self.form.focus_path, self.form.problem) = (true, Some(problem)),
             }
@@ -148,10 +144,10 @@ impl Export {
                 }
             };
             let form = self.form.ui(&WORDS, Layout::Row("Export the visible range as"), more, ui);
-            asked.save = asked.save.or(form.save);
-            asked.dialog = form.dialog;
+            request.save = request.save.or(form.save);
+            request.dialog = form.dialog;
         }
-        asked
+        request
     }
 
     /// Starts to write; what cannot be is said in the form.

@@ -3,10 +3,10 @@
 use egui::{Color32, CursorIcon, Response, Stroke, Ui};
 use egui_plot::{PlotTransform, PlotUi, Span, VLine};
 
-/// How near to a mark a press takes hold of it, points.
+/// Hit distance of a mark, points.
 pub(super) const REACH: f32 = 6.0;
 
-/// What a drag has hold of.
+/// Dragged object.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Hold {
     Cursor,
@@ -19,18 +19,18 @@ enum Hold {
 /// Cursor and range that all plots of a stack show.
 #[derive(Clone, Copy, Debug)]
 pub struct Marks {
-    /// Where the cursor is.
+    /// Position of the cursor.
     pub cursor: f64,
     /// The chosen range.
     pub range: [f64; 2],
-    /// Whether the range is shaded.
+    /// True if the range is shaded.
     pub shade: bool,
-    /// What there is to choose from.
+    /// Options.
     pub limits: [f64; 2],
     hold: Option<Hold>,
 }
 
-/// What the user did to the marks.
+/// User actions on the marks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Moved {
     /// The cursor was moved.
@@ -45,7 +45,7 @@ impl Marks {
         Self { cursor: limits[0], range: limits, shade: false, limits, hold: None }
     }
 
-    /// Whether a drag moves a mark, and not the plot.
+    /// Returns whether a drag moves a mark, and not the plot.
     pub(super) fn held(&self) -> bool {
         self.hold.is_some()
     }

@@ -1,20 +1,18 @@
 //! Plots over a shared horizontal range: decimated, following or held, with exact statistics.
 
 mod axes;
-mod bins;
 mod column;
 mod cursors;
 mod decimate;
+mod draw_cache;
 mod end_to_end;
 mod export;
 mod figure;
-mod kept;
 mod marks;
 mod pyramid;
 mod readout;
 mod response;
 mod spectra;
-mod spectrum;
 mod stack;
 #[cfg(test)]
 mod tests;
@@ -22,7 +20,6 @@ mod unit;
 mod view;
 
 pub(crate) use axes::{Axes, Y_AXIS_WIDTH};
-pub(crate) use bins::{Band, Bin, binned};
 pub use column::{CHUNK, TimeColumn, ValueColumn};
 pub use decimate::{Curve, Data, DecimationCache, RangeStatistics, Visible, decimate};
 pub(crate) use end_to_end::one_after_another;

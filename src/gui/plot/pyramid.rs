@@ -19,7 +19,7 @@ const fn size(level: usize) -> usize {
     1 << shift(level)
 }
 
-/// The same as a power of two.
+/// Exponent of two.
 const fn shift(level: usize) -> u32 {
     BLOCK.ilog2() + level as u32 * FAN.ilog2()
 }
@@ -374,7 +374,7 @@ impl Steps {
         self.checked = self.checked.saturating_sub(CHUNK);
     }
 
-    /// Whether the values can be a horizontal axis.
+    /// Returns whether the values can be a horizontal axis.
     pub(super) fn are_sound(&self) -> bool {
         !self.is_broken
     }
@@ -401,7 +401,7 @@ pub(super) struct Gaps<'a> {
 }
 
 impl Gaps<'_> {
-    /// Whether a gap lies before the sample.
+    /// Returns whether a gap lies before the sample.
     pub(super) fn is_before(&self, index: usize) -> bool {
         step(self.x, index) > self.longest
     }

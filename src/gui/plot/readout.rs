@@ -1,4 +1,4 @@
-//! What the curves are at two cursors and between them, as a table that can be copied.
+//! Table of the curves at two cursors and between them.
 
 use egui::{Color32, Grid, RichText, ScrollArea, Ui};
 
@@ -10,23 +10,23 @@ use crate::widgets::{mono, shown};
 
 /// Columns of the table with what they mean.
 const COLUMNS: [(&str, &str); 10] = [
-    ("A", "Value at cursor A: the last sample not later"),
-    ("B", "Value at cursor B: the last sample not later"),
-    ("Δy", "Value at B minus value at A"),
+    ("A", "Value at cursor A (last sample)"),
+    ("B", "Value at cursor B (last sample)"),
+    ("Δy", "Difference B − A"),
     ("mean", "Mean of the samples between the cursors"),
-    ("RMS", "Root of the mean square between the cursors"),
+    ("RMS", "RMS between the cursors"),
     ("min", "Smallest value between the cursors"),
     ("max", "Largest value between the cursors"),
     ("std", "Standard deviation between the cursors"),
     (
         "overshoot",
-        "How far the curve goes beyond its final value, in percent of its change: from the value at the earlier \
-         cursor to the final value, which is the mean of the last tenth before the later one",
+        "Overshoot in percent of the change from the earlier cursor to the \
+         final value (mean of the last 10 % before the later cursor)",
     ),
     (
         "settling",
-        "Time after the earlier cursor from which on the curve stays within 2 % of its change about its final \
-         value, up to the later one",
+        "Settling time after the earlier cursor (2 % band around \
+         the final value)",
     ),
 ];
 
@@ -100,8 +100,7 @@ pub(super) fn readout_ui(ui: &mut Ui, cursors: &mut Cursors, readings: &[Reading
 fn head_ui(ui: &mut Ui, cursors: &mut Cursors, readings: &[Reading]) {
     for (number, name) in NAMES.into_iter().enumerate() {
         let text = format!("{name} {:.4} s", cursors.at[number]);
-        let help =
-            "The arrow keys move the chosen cursor by one sample, with Shift by ten; drag it with the mouse";
+        let help = "Drag, or move the selected cursor with the arrow keys by one sample (ten with Shift)";
         let chosen = ui.selectable_label(cursors.active == number, mono(text)).on_hover_text(help);
         if chosen.accessible_name(format!("cursor {name}")).clicked() {
             cursors.active = number;
@@ -111,7 +110,7 @@ fn head_ui(ui: &mut Ui, cursors: &mut Cursors, readings: &[Reading]) {
     let rate = if span == 0.0 { "–".to_owned() } else { format!("{} Hz", shown(1.0 / span.abs(), 4)) };
     let times = format!("Δt {} s   1/Δt {rate}", format!("{span:.4}").replace('-', "−"));
     ui.label(mono(times));
-    if ui.button("Copy table").on_hover_text("Copy the table, for a spreadsheet").clicked() {
+    if ui.button("Copy table").on_hover_text("Copy the table for a spreadsheet").clicked() {
         ui.ctx().copy_text(table(cursors, readings));
     }
 }

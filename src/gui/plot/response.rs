@@ -1,4 +1,4 @@
-//! What a curve does between two cursors, as a response to a step.
+//! Step-response characteristics of a curve between two cursors.
 //!
 //! The curve goes from its value at the first cursor to its final value, the mean of the last tenth between the
 //! cursors. Overshoot is how far it goes beyond the final value, in percent of that change. Settling time is how
@@ -16,9 +16,9 @@ const FEWEST: usize = 10;
 /// Overshoot and settling time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct StepResponse {
-    /// Beyond the final value, percent of the change; none where there is no change.
+    /// Beyond the final value, percent of the change; `None` if there is no change.
     pub(super) overshoot_percent: Option<f64>,
-    /// After the first cursor, s; none where the curve leaves the band up to the end.
+    /// After the first cursor, s; `None` if the curve leaves the band up to the end.
     pub(super) settling_s: Option<f64>,
 }
 
@@ -34,7 +34,7 @@ pub(super) fn step_response(curve: &Indexed<'_>, range: Range<usize>) -> StepRes
     };
     let (start, end) = (curve.y(range.start), tail.mean);
     let change = end - start;
-    // What changes less than it moves at the end has not been asked for a step.
+    // What changes less than it moves at the end has not been requested a step.
     if change == 0.0 || change.abs() <= tail.std {
         return none;
     }

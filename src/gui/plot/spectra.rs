@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use egui::{Color32, RichText, Ui, vec2};
+use flqr_core::signal::Spectrum;
 
 use super::decimate::{Curve, DecimationCache, Snapshot};
-use super::spectrum::Spectrum;
 use super::unit::label;
 use super::view::{Drawing, TimePlot, TimeView, columns, interact, y_range};
 use crate::job::{Job, Outcome, Waker};
@@ -16,10 +16,10 @@ use crate::widgets::{error_ui, mono, shown};
 const INTERVAL_S: f64 = 0.25;
 /// Room for the strongest frequency at the right.
 const PEAK_WIDTH: f32 = 118.0;
-/// What is weaker than the strongest by more than this, as a power of ten, is not worth the room.
+/// Dynamic range of a spectrum, in powers of ten below its maximum.
 const DECADES: f64 = 6.0;
 
-/// What is shown of a spectrum.
+/// Kind of spectrum.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Measure {
     #[default]
@@ -29,7 +29,7 @@ pub(super) enum Measure {
 
 impl Measure {
     pub(super) const ALL: [(Self, &'static str, &'static str); 2] = [
-        (Self::Amplitude, "Amplitude", "Peak value of the sine at each frequency (Hann window)"),
+        (Self::Amplitude, "Amplitude", "Amplitude spectrum, peak value (Hann window)"),
         (Self::Density, "Density", "One-sided power spectral density (Hann window)"),
     ];
 
@@ -53,7 +53,7 @@ struct Entry {
     caches: [DecimationCache; 2],
 }
 
-/// What a worker brings.
+/// Result of a worker.
 #[derive(Default)]
 struct Found {
     spectrum: Spectrum,
@@ -127,7 +127,7 @@ impl Spectra {
         let work = move |_: &_| snapshots.iter().map(Found::of).collect();
         match Job::start("spectra", &waker, work) {
             Ok(job) => self.job = Some(SpectraJob { wanted, job }),
-            Err(error) => self.problem = Some(format!("No thread for the spectra: {error}.")),
+            Err(error) => self.problem = Some(format!("Cannot start computing the spectra: {error}.")),
         }
     }
 
@@ -140,7 +140,7 @@ impl Spectra {
                 found
             }
             Outcome::Broken => {
-                self.problem = Some("The spectra failed: this is a defect of flqr.".to_owned());
+                self.problem = Some("Computing the spectra failed: this is an internal error.".to_owned());
                 // Not tried again with the same data.
                 wanted.iter().map(|_| Found::default()).collect()
             }
@@ -218,7 +218,7 @@ impl Spectra {
         for (key, name, color) in curves {
             let Some(entry) = self.entries.get(key) else { continue };
             let spectrum = &entry.found.spectrum;
-            let waits = (entry.generation == 0).then_some("at work");
+            let waits = (entry.generation == 0).then_some("computing");
             if let Some(problem) = entry.found.problem.or(waits) {
                 ui.label(RichText::new(problem).small().weak());
                 continue;
@@ -231,7 +231,7 @@ impl Spectra {
             let Some(strongest) = strongest else { continue };
             let text = format!("{} Hz", shown(spectrum.frequency_hz[strongest], 4));
             let help = format!(
-                "{name}: strongest frequency, and its value; mean of {} windows over the visible range",
+                "{name}: peak frequency and value; average of {} windows in the visible range",
                 spectrum.windows
             );
             ui.label(mono(text).color(*color)).on_hover_text(&help);

@@ -2,7 +2,7 @@
 
 use egui::{Context, Id};
 
-/// What a quantity is measured in; values are in the core's unit.
+/// Display unit of a quantity; values are in the core's unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Unit {
     /// An angle, rad.
@@ -30,7 +30,7 @@ impl Default for UnitChoice {
     }
 }
 
-/// Whether angles are shown in degrees: one choice for all of the window, which its session keeps.
+/// Returns whether angles are shown in degrees: one choice for all of the window, which its session keeps.
 pub(crate) fn degrees(ctx: &Context) -> bool {
     ctx.data(|data| data.get_temp(degrees_id())).unwrap_or_else(|| UnitChoice::default().degrees)
 }

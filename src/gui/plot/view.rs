@@ -12,7 +12,7 @@ const MIN_SPAN: f64 = 1e-3;
 /// The horizontal range of a stack of plots: it follows the newest sample until the user moves it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TimeView {
-    /// Whether the newest sample stays at the right edge.
+    /// True if the newest sample stays at the right edge.
     pub follow: bool,
     /// Length of the range.
     pub span: f64,
@@ -77,7 +77,7 @@ pub(super) struct TimePlot<'a> {
     pub(super) x_label: Option<&'a str>,
 }
 
-/// What one plot shows.
+/// View of one plot.
 #[derive(Default)]
 pub(super) struct Drawing<'a> {
     /// Lines with gaps, in the order in which they are drawn.
@@ -151,7 +151,7 @@ pub(super) fn columns(ui: &Ui) -> usize {
     ((ui.available_width() - Y_AXIS_WIDTH).max(1.0) * ui.ctx().pixels_per_point()) as usize
 }
 
-/// Values beyond this cannot be told apart on a screen, and their differences are no numbers.
+/// Values beyond this cannot be distinguished on a screen, and their differences are no numbers.
 const LARGEST: f64 = 1e300;
 
 /// A vertical range with a margin, never empty, centred on all of these.

@@ -1,7 +1,7 @@
-//! Every effect that was tried, best first, and what became of it.
+//! Every effect that was tried, best first, and outcome.
 
 use egui::{Grid, RichText, Sense, Ui, vec2};
-use flqr_core::refine::{Fate, Refinement, Tried, Verdict};
+use flqr_core::refine::{Outcome, Refinement, ScoredCandidate, Verdict};
 
 use super::effects::place_text;
 use super::strip::{StepState, Tone};
@@ -11,20 +11,20 @@ use crate::widgets::{hint_ui, mono, section_ui, shown};
 /// Width of the bar of a whole gain.
 const BAR: f32 = 90.0;
 
-/// How this step stands.
+/// State of this step.
 pub(super) fn state(found: Option<&Refinement>) -> StepState {
-    let Some(found) = found else { return StepState::new("nothing tried", Tone::Open) };
+    let Some(found) = found else { return StepState::new("no candidates", Tone::Open) };
     let listed = listed(found);
-    let added = listed.iter().filter(|tried| tried.fate == Fate::Added).count();
+    let added = listed.iter().filter(|tried| tried.outcome == Outcome::Added).count();
     match listed.len() {
-        0 => StepState::new("nothing listed", Tone::Open),
-        count => StepState::new(format!("{count} tried, {added} added"), Tone::Plain),
+        0 => StepState::new("no list", Tone::Open),
+        count => StepState::new(format!("{count} candidates, {added} added"), Tone::Plain),
     }
 }
 
-/// What was tried, each once: of trials that read alike, the best.
-fn listed(found: &Refinement) -> Vec<&Tried> {
-    let mut listed: Vec<&Tried> = Vec::new();
+/// Candidates, each once: of trials that read alike, the best.
+fn listed(found: &Refinement) -> Vec<&ScoredCandidate> {
+    let mut listed: Vec<&ScoredCandidate> = Vec::new();
     for tried in &found.candidates {
         if !listed.iter().any(|other| (other.kind.id, &other.detail) == (tried.kind.id, &tried.detail)) {
             listed.push(tried);
@@ -34,27 +34,27 @@ fn listed(found: &Refinement) -> Vec<&Tried> {
 }
 
 pub(super) fn ui(found: &Refinement, ui: &mut Ui) {
-    section_ui(ui, "What was tried", |_| {});
+    section_ui(ui, "Candidates", |_| {});
     if found.candidates.is_empty() {
         hint_ui(
             ui,
             match found.verdict {
                 Verdict::DataUnfit => {
-                    "Nothing was tried: the logs cannot answer, for the reasons under Health."
+                    "No candidates: the logs are not suitable for identification, see Health."
                 }
-                _ => "This search does not list what it tried.",
+                _ => "No list of candidates for this search.",
             },
         );
         return;
     }
     hint_ui(
         ui,
-        "Gain: by how much the error on left-out blocks is lower with the effect alone beside the declared model. z: its size in standard errors. Point at an effect for what it is and what shows it.",
+        "Gain: error reduction on left-out blocks with this effect alone. z: estimate divided by its standard error. Hover over an effect for its description.",
     );
     ui.add_space(4.0);
     let grid = Grid::new("candidates").num_columns(6).striped(true).spacing([16.0, 3.0]);
     grid.show(ui, |ui| {
-        for title in ["", "effect", "detail", "gain on left-out blocks", "z", "what became of it"] {
+        for title in ["", "effect", "detail", "gain on left-out blocks", "z", "outcome"] {
             hint_ui(ui, title);
         }
         ui.end_row();
@@ -64,15 +64,15 @@ pub(super) fn ui(found: &Refinement, ui: &mut Ui) {
     });
 }
 
-fn row_ui(index: usize, tried: &Tried, ui: &mut Ui) {
+fn row_ui(index: usize, tried: &ScoredCandidate, ui: &mut Ui) {
     let colors = palette(ui.visuals());
-    let added = tried.fate == Fate::Added;
+    let added = tried.outcome == Outcome::Added;
     ui.label(mono(format!("{}", index + 1)).weak());
     let name = RichText::new(tried.kind.id);
     let name = if added { name.strong().color(colors.accent) } else { name };
     let kind = tried.kind;
     ui.add(egui::Label::new(name).extend().sense(Sense::hover())).on_hover_text(format!(
-        "{}.\nActs: {}.\nShown by: {}.",
+        "{}.\nActs: {}.\nBest shown by: {}.",
         kind.summary,
         place_text(kind.place),
         kind.separated_by
@@ -89,11 +89,13 @@ fn row_ui(index: usize, tried: &Tried, ui: &mut Ui) {
     });
     // A shape without a standard error, as a limit is, has none.
     ui.label(mono(shown(if tried.z.is_finite() { tried.z } else { f64::NAN }, 3)));
-    let color = match tried.fate {
-        Fate::Added => colors.good,
-        Fate::NotToldFrom(_) => colors.warning,
-        Fate::Explained | Fate::TooSmall | Fate::NotSure | Fate::NotTestable => ui.visuals().text_color(),
+    let color = match tried.outcome {
+        Outcome::Added => colors.good,
+        Outcome::Ambiguous(_) => colors.warning,
+        Outcome::Explained | Outcome::TooSmall | Outcome::NotSignificant | Outcome::NotTestable => {
+            ui.visuals().text_color()
+        }
     };
-    ui.add(egui::Label::new(RichText::new(tried.fate.to_string()).color(color)).extend());
+    ui.add(egui::Label::new(RichText::new(tried.outcome.to_string()).color(color)).extend());
     ui.end_row();
 }

@@ -1,4 +1,4 @@
-//! What this page asks for.
+//! Requests of this page.
 
 use std::path::PathBuf;
 
@@ -10,7 +10,7 @@ use super::save::SavedAs;
 /// One wish of this page.
 #[derive(Clone, Debug)]
 pub(crate) enum RefineCommand {
-    /// Loads a log beside those that are there, or one of them again.
+    /// Loads a log next to those that are there, or one of them again.
     Load {
         path: PathBuf,
         held_out: bool,
@@ -19,7 +19,7 @@ pub(crate) enum RefineCommand {
     Clear,
     /// Stops loading a log, or takes it from the list.
     Remove(u64),
-    /// Whether a log takes no part in the estimates.
+    /// True if a log takes no part in the estimates.
     HoldOut(u64, bool),
     /// Puts a question to the logs.
     Start(Question),
@@ -36,7 +36,7 @@ pub(crate) enum RefineCommand {
     },
 }
 
-/// What a file dialog of this page is for.
+/// Purpose of a file dialog of this page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum RefineFile {
     Log,

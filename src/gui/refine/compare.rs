@@ -21,7 +21,7 @@ impl Row {
     }
 }
 
-/// How this step stands.
+/// State of this step.
 pub(super) fn state(found: Option<&Refinement>) -> StepState {
     let Some(found) = found else { return StepState::new("nothing yet", Tone::Open) };
     let [before, after] = [&found.before, &found.after].map(|errors| errors.rmse.main());
@@ -51,9 +51,9 @@ fn rows(first: &Errors, second: Option<&Errors>) -> Vec<Row> {
     };
     let mut rows = channels("residual", |errors| &errors.rmse);
     rows.extend(channels("noise floor of the residual", |errors| &errors.noise_floor));
-    rows.extend(channels("residual by the torque or force", |errors| &errors.nrmse));
+    rows.extend(channels("residual relative to the torque or force", |errors| &errors.nrmse));
     for (index, prediction) in first.prediction.iter().enumerate() {
-        let shown_of = |own: &Prediction| own.told.then_some(own.rmse.value);
+        let shown_of = |own: &Prediction| own.informative.then_some(own.rmse.value);
         let after = second.and_then(|second| second.prediction.get(index)).and_then(shown_of);
         rows.push(Row {
             name: format!("{} after {} ms", prediction.variable, plain(1e3 * prediction.horizon_s, 3)),
@@ -66,17 +66,17 @@ fn rows(first: &Errors, second: Option<&Errors>) -> Vec<Row> {
 
 /// Errors of both models.
 pub(super) fn ui(found: &Refinement, ui: &mut Ui) {
-    section_ui(ui, "On rows that took no part in the estimates", |_| {});
+    section_ui(ui, "On held-out rows", |_| {});
     table_ui("errors before and after", &rows(&found.before, Some(&found.after)), true, ui);
     hint_ui(
         ui,
-        "The same rows and filters before and after; before: the declared model, its numbers estimated within their tolerances.",
+        "The same rows and filters before and after; before: the declared model, its parameters estimated within their tolerances.",
     );
     if let Some(closed_loop) = &found.closed_loop {
         closed_loop_ui(closed_loop, ui);
     }
     if !found.parameters.is_empty() {
-        section_ui(ui, "Declared numbers as the logs have them", |_| {});
+        section_ui(ui, "Declared parameters, estimated from the logs", |_| {});
         parameters_ui(found, ui);
     }
 }
@@ -109,14 +109,14 @@ fn closed_loop_ui(closed_loop: &ClosedLoop, ui: &mut Ui) {
             .collect();
         table_ui(&format!("closed loop {}", pair.scenario), &rows, true, ui);
     }
-    hint_ui(ui, "Before: the controller of the declared model; after: the one made from the refined model.");
+    hint_ui(ui, "Before: controller of the declared model; after: controller of the refined model.");
     for fed in &closed_loop.feedforward {
-        let used = if fed.used { "fed forward" } else { "not fed forward" };
+        let used = if fed.used { "with feedforward" } else { "without feedforward" };
         hint_ui(ui, format!("{}: {used}, {}", fed.effect.id, fed.reason));
     }
 }
 
-/// Errors of the model as it is.
+/// Errors of the nominal model.
 pub(super) fn residual_ui(residual: &Residual, ui: &mut Ui) {
     table_ui("errors of the model", &rows(&residual.errors, None), false, ui);
     if residual.tests.is_empty() {
@@ -162,7 +162,7 @@ fn table_ui(id: &str, rows: &[Row], both: bool, ui: &mut Ui) {
 }
 
 fn parameters_ui(found: &Refinement, ui: &mut Ui) {
-    Grid::new("corrected numbers").num_columns(5).striped(true).spacing([16.0, 3.0]).show(ui, |ui| {
+    Grid::new("corrected parameters").num_columns(5).striped(true).spacing([16.0, 3.0]).show(ui, |ui| {
         for title in ["number", "declared", "estimated", "95 % interval"] {
             hint_ui(ui, title);
         }

@@ -1,4 +1,4 @@
-//! What was found, and its way into the model.
+//! Identified effects and their use in the model.
 
 use egui::{Frame, Grid, RichText, Ui};
 use flqr_core::effects::Place;
@@ -14,13 +14,13 @@ use crate::context::ViewContext;
 use crate::theme::palette;
 use crate::widgets::{hint_ui, mono, section_ui, shown, warning_ui};
 
-/// How this step stands.
+/// State of this step.
 pub(super) fn state(found: Option<&Refinement>, in_model: bool) -> StepState {
     let Some(found) = found else { return StepState::new("nothing yet", Tone::Open) };
     match (found.verdict, found.effects.len()) {
-        (Verdict::DataUnfit, _) => StepState::new("data unfit", Tone::Error),
+        (Verdict::DataUnfit, _) => StepState::new("log not suitable for identification", Tone::Error),
         (Verdict::UnexplainedResidual, _) => StepState::new("unexplained", Tone::Warning),
-        (_, 0) => StepState::new("nothing is missing", Tone::Good),
+        (_, 0) => StepState::new("no missing effects", Tone::Good),
         (_, _) if in_model => StepState::new("in the model", Tone::Good),
         (_, 1) => StepState::new("1 effect found", Tone::Plain),
         (_, count) => StepState::new(format!("{count} effects found"), Tone::Plain),
@@ -40,13 +40,13 @@ pub(super) fn verdict_ui(found: &Refinement, ui: &mut Ui) {
     ui.add(egui::Label::new(text).wrap());
 }
 
-/// What the simulated robot of a demonstration had.
+/// Hidden effect of the demo robot.
 pub(super) fn truth_ui(truth: &Truth, ui: &mut Ui) {
     let parameters = truth.effect.parameters().iter();
     let sizes: Vec<String> = parameters.map(|(key, value)| format!("{key} {}", shown(*value, 3))).collect();
-    let verdict = if truth.named { "It was found." } else { "It was not found by its name." };
+    let verdict = if truth.named { "It was identified." } else { "It was not identified." };
     let id = truth.effect.id();
-    hint_ui(ui, format!("In truth the simulated robot has {id}: {}. {verdict}", sizes.join(", ")));
+    hint_ui(ui, format!("The simulated robot has {id}: {}. {verdict}", sizes.join(", ")));
 }
 
 /// One effect: what it is, its size, what this log cannot tell from it, and whether it is to be added.
@@ -55,7 +55,7 @@ pub(super) fn effect_ui(found: &Found, added: &mut bool, ui: &mut Ui) {
     Frame::group(ui.style()).show(ui, |ui| {
         ui.set_min_width(ui.available_width());
         ui.horizontal_wrapped(|ui| {
-            let help = "An effect that is not ticked stays out of the model that is used and saved";
+            let help = "Only selected effects are added to the model";
             let tick = ui.checkbox(added, "add it").on_hover_text(help);
             tick.accessible_name(format!("add {}", kind.id));
             ui.label(RichText::new(kind.id).strong().size(15.0));
@@ -63,7 +63,7 @@ pub(super) fn effect_ui(found: &Found, added: &mut bool, ui: &mut Ui) {
                 ui.label(RichText::new(format!("{motor} motor")).small());
             }
             if found.error_drop_percent.is_finite() {
-                let text = format!("held-out error lower by {} %", shown(found.error_drop_percent, 3));
+                let text = format!("held-out error reduced by {} %", shown(found.error_drop_percent, 3));
                 ui.label(RichText::new(text).color(palette(ui.visuals()).good));
             }
         });
@@ -71,13 +71,13 @@ pub(super) fn effect_ui(found: &Found, added: &mut bool, ui: &mut Ui) {
         sizes_ui(found, ui);
         if !found.ambiguous_with.is_empty() {
             let others: Vec<&str> = found.ambiguous_with.iter().map(|kind| kind.id).collect();
-            let text = format!("This log cannot tell it from {}.", others.join(", "));
+            let text = format!("This log cannot distinguish it from {}.", others.join(", "));
             warning_ui(ui, text).on_hover_text(kind.separated_by);
         }
     });
 }
 
-/// What no effect explains; gives the variable that is to be looked at.
+/// Unexplained structure; returns the selected variable.
 pub(super) fn unexplained_ui(unexplained: &Unexplained, ui: &mut Ui) -> Option<String> {
     if unexplained.description.is_empty() {
         return None;
@@ -87,10 +87,10 @@ pub(super) fn unexplained_ui(unexplained: &Unexplained, ui: &mut Ui) -> Option<S
     let mut chosen = None;
     ui.horizontal_wrapped(|ui| {
         for (index, variable) in unexplained.depends_on.iter().enumerate() {
-            let share = unexplained.shares.get(index).filter(|share| share.is_finite());
+            let share = unexplained.fractions.get(index).filter(|share| share.is_finite());
             let share = share.map_or_else(String::new, |share| format!(", {} %", shown(100.0 * share, 3)));
             let look = ui.button(format!("over {variable}{share}"));
-            if look.on_hover_text("Look at the residual over it").clicked() {
+            if look.on_hover_text("Plot the residual over this variable").clicked() {
                 chosen = Some(variable.clone());
             }
         }
@@ -98,13 +98,13 @@ pub(super) fn unexplained_ui(unexplained: &Unexplained, ui: &mut Ui) -> Option<S
     chosen
 }
 
-/// What to record next.
+/// Next experiment.
 pub(super) fn next_ui(context: &ViewContext<'_>, next: &NextExperiment, ui: &mut Ui) {
     section_ui(ui, "Next experiment", |_| {});
     ui.add(egui::Label::new(format!("{}.", capitalised(&next.summary))).wrap());
     if next.separation.is_finite() && next.separation > 0.0 {
         let separation = shown(next.separation, 3);
-        hint_ui(ui, format!("The residuals would be {separation} standard deviations of the noise apart."));
+        hint_ui(ui, format!("The residuals would differ by {separation} standard deviations of the noise."));
     }
     ui.horizontal_wrapped(|ui| {
         let scenario = next.scenario.as_deref().and_then(|name| name.parse::<Scenario>().ok());
@@ -146,14 +146,14 @@ fn sizes_ui(found: &Found, ui: &mut Ui) {
     });
 }
 
-/// Where an effect sits, in words.
+/// Describes the location of an effect.
 pub(super) fn place_text(place: Place) -> &'static str {
     match place {
         Place::Motor => "torque inside the motor",
         Place::Translation => "force on the robot",
         Place::Pitch => "torque on the body",
-        Place::Actuator => "between the torque asked for and the one on the shaft",
-        Place::Sensor => "in what the sensors say",
-        Place::Parameter => "in a declared number",
+        Place::Actuator => "between the commanded torque and the shaft torque",
+        Place::Sensor => "in the sensors",
+        Place::Parameter => "in a declared parameter",
     }
 }

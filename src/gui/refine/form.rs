@@ -1,8 +1,7 @@
-//! What is asked: free parameters, seed, and the buttons that start and stop the search.
+//! Search settings: free parameters, seed, and the buttons that start and stop the search.
 
 use egui::{Button, Grid, ProgressBar, RichText, TextEdit, Ui, vec2};
-use flqr_core::model_file::Rig;
-use flqr_core::robot::Motor;
+use flqr_core::model::{Motor, Rig};
 
 use super::command::RefineCommand;
 use super::run::{Question, Run, Settings, is_of_demo};
@@ -33,12 +32,12 @@ pub(super) fn ui(
 fn settings_ui(context: &ViewContext<'_>, settings: &mut Settings, ui: &mut Ui) {
     ui.label("model");
     ui.add(egui::Label::new(RichText::new(&context.session.name).strong()).truncate())
-        .on_hover_text("The model of this window, as it is now");
+        .on_hover_text("Current model of this window");
     ui.end_row();
     if matches!(context.session.rig, Rig::Robot(_)) {
         ui.label("motor");
         ui.horizontal(|ui| {
-            let help = "Of a bench log, the motor that it belongs to";
+            let help = "Motor that a bench log belongs to";
             choice_ui(ui, &mut settings.motor, &[(Motor::Left, "left", help), (Motor::Right, "right", help)]);
         });
         ui.end_row();
@@ -46,12 +45,12 @@ fn settings_ui(context: &ViewContext<'_>, settings: &mut Settings, ui: &mut Ui) 
     ui.label("free");
     let field = TextEdit::singleline(&mut settings.estimate).hint_text("none").desired_width(180.0);
     ui.add(field).accessible_name("free parameters").on_hover_text(
-        "Declared numbers that may be anything: “all”, or names as in the model file, separated by commas. The others are estimated along within their tolerances",
+        "Parameters to estimate without prior: “all”, or names as in the model file, separated by commas. The others are estimated within their tolerances",
     );
     ui.end_row();
     ui.label("seed");
     entry_ui(ui, &mut settings.seed, "seed of the search", |field| field)
-        .on_hover_text("Same model, logs and seed: same result");
+        .on_hover_text("The same model, logs and seed give the same result");
     ui.end_row();
 }
 
@@ -72,16 +71,16 @@ fn run_ui(context: &ViewContext<'_>, sources: &Sources, run: &Run, ui: &mut Ui) 
     }
     let why_not = why_not(sources);
     let fill = ui.visuals().selection.bg_fill;
-    let text = RichText::new("Find what is missing").strong();
+    let text = RichText::new("Find missing effects").strong();
     let size = vec2(ui.available_width(), 26.0);
     ui.add_enabled_ui(why_not.is_none(), |ui| {
         let search = ui.add_sized(size, Button::new(text).fill(fill));
-        let help = "Look for effects that the model lacks (Ctrl+Enter)";
+        let help = "Find effects that the model lacks (Ctrl+Enter)";
         if search.on_hover_text(help).clicked() {
             send(RefineCommand::Start(Question::Refine));
         }
-        let residual = ui.add_sized(size, Button::new("How far is the model?"));
-        if residual.on_hover_text("The residual alone, without a search").clicked() {
+        let residual = ui.add_sized(size, Button::new("Compute residual"));
+        if residual.on_hover_text("Residual only, without a search").clicked() {
             send(RefineCommand::Start(Question::Residual));
         }
     });
@@ -95,14 +94,14 @@ fn run_ui(context: &ViewContext<'_>, sources: &Sources, run: &Run, ui: &mut Ui) 
 fn demo_ui(context: &ViewContext<'_>, sources: &Sources, ui: &mut Ui) {
     let ready = is_of_demo(&context.session.model()) && !sources.is_loading();
     let demo = ui.add_enabled(ready, Button::new("Try it on a demo robot"));
-    let help = "Records a simulated robot with something that its model does not have, and looks for it; the seed chooses what. The logs of the list give way to these records";
-    let why_not = "Needs the preset of the paper's robot, unchanged: open it on the Tune page";
+    let help = "Simulates a robot with a hidden effect, selected by the seed, and identifies it. Replaces the logs in the list";
+    let why_not = "Needs the unchanged preset of the paper's robot: load it on the Tune page";
     if demo.on_hover_text(help).on_disabled_hover_text(why_not).clicked() {
         context.commands.send(Command::Refine(RefineCommand::Start(Question::Demo)));
     }
 }
 
-/// Why nothing can be asked now.
+/// Reason why no search can start now.
 pub(super) fn why_not(sources: &Sources) -> Option<&'static str> {
     if sources.is_loading() {
         return Some("A log is still being loaded.");

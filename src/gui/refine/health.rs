@@ -9,7 +9,7 @@ use super::strip::{StepState, Tone};
 use crate::health_card::{findings_ui, log_ui};
 use crate::widgets::{empty_page_ui, error_ui, section_ui};
 
-/// What the last answer says of the logs beyond what loading them said.
+/// Findings of the last result in addition to those of loading.
 fn of_answer<'a>(run: &'a Run, sources: &Sources) -> Vec<&'a HealthFinding> {
     let findings = match (&run.refined, &run.residual) {
         (Some(refined), Some(residual)) if residual.generation > refined.generation => {
@@ -24,7 +24,7 @@ fn of_answer<'a>(run: &'a Run, sources: &Sources) -> Vec<&'a HealthFinding> {
     findings.iter().filter(known).collect()
 }
 
-/// How this step stands.
+/// State of this step.
 pub(super) fn state(run: &Run, sources: &Sources) -> StepState {
     if sources.list.is_empty() {
         return StepState::new("no log yet", Tone::Open);
@@ -45,7 +45,7 @@ pub(super) fn state(run: &Run, sources: &Sources) -> StepState {
     let warnings = count(Severity::Warning) + damaged;
     let counted = |count: usize, word: &str| format!("{count} {word}{}", if count == 1 { "" } else { "s" });
     match (errors, warnings) {
-        (0, 0) => StepState::new("nothing wrong", Tone::Good),
+        (0, 0) => StepState::new("no problems", Tone::Good),
         (0, _) => StepState::new(counted(warnings, "warning"), Tone::Warning),
         (_, 0) => StepState::new(counted(errors, "error"), Tone::Error),
         _ => StepState::new(
@@ -57,12 +57,12 @@ pub(super) fn state(run: &Run, sources: &Sources) -> StepState {
 
 pub(super) fn ui(run: &Run, sources: &Sources, ui: &mut Ui) {
     if sources.list.is_empty() {
-        let hint = "Add logs of the machine that the open model describes: the search finds what the model lacks, and how far it is off before and after.";
+        let hint = "Add logs of the machine that the open model describes. The search identifies missing effects and compares the errors before and after.";
         return empty_page_ui(ui, "No log yet.", hint, |_| {});
     }
     let of_answer = of_answer(run, sources);
     if !of_answer.is_empty() {
-        section_ui(ui, "What the search says of the data", |_| {});
+        section_ui(ui, "Data health of the search", |_| {});
         findings_ui(of_answer, ui);
     }
     for source in &sources.list {

@@ -16,7 +16,7 @@ mod strip;
 use std::path::{Path, PathBuf};
 
 use egui::{Frame, Margin, Panel, RichText, ScrollArea, Ui};
-use flqr_core::model_file::Model;
+use flqr_core::model::Model;
 use flqr_core::refine::{Refinement, Verdict};
 use flqr_core::report::{Block, Tone as ReportTone};
 use flqr_core::simulate::Scenario;
@@ -64,7 +64,7 @@ pub(crate) struct RefineTab {
     saving: Option<Model>,
 }
 
-/// What the page's commands may use of the window.
+/// Parts of the window available to the page's commands.
 pub(crate) struct Surroundings<'a> {
     pub(crate) session: &'a mut Session,
     /// The file that holds the very model of the session.
@@ -72,7 +72,7 @@ pub(crate) struct Surroundings<'a> {
     pub(crate) waker: &'a Waker,
 }
 
-/// What a command of the page leaves for the window to do.
+/// Request of a page command to the window.
 #[derive(Default)]
 pub(crate) struct Done {
     /// For the status line.
@@ -83,10 +83,10 @@ pub(crate) struct Done {
     pub(crate) log: Option<PathBuf>,
 }
 
-/// How an answer stands to what is there now.
+/// Relation of a result to the current inputs.
 enum Standing {
     Fresh,
-    /// What was found is in the model.
+    /// The effects are in the model.
     InModel,
     /// Model, logs or settings are others now; a sentence says which.
     Stale(String),
@@ -125,7 +125,7 @@ impl RefineTab {
         files.map(|source| (source.path.clone(), source.held_out)).collect()
     }
 
-    /// Whether there are plots of a residual.
+    /// Returns whether there are plots of a residual.
     pub(crate) fn has_residual(&self) -> bool {
         residual::has_plots(self.run.refined.as_ref())
     }
@@ -146,7 +146,7 @@ impl RefineTab {
         }
     }
 
-    /// Does what the page asked for.
+    /// Does what the page requested.
     ///
     /// # Errors
     /// A sentence says why it was not done.
@@ -179,7 +179,7 @@ impl RefineTab {
         }
         let made = self.made(around.session);
         if question == Question::Demo && !is_of_demo(&made.model) {
-            return Err("The demonstration needs the preset of the paper's robot, unchanged.".to_owned());
+            return Err("The demo needs the unchanged preset of the paper's robot.".to_owned());
         }
         self.run.start(question, made, around.model_path, around.waker)
     }
@@ -192,7 +192,7 @@ impl RefineTab {
         }
     }
 
-    /// What a question put now would be made of.
+    /// Inputs of a search started now.
     fn made(&self, session: &Session) -> Made {
         Made { model: session.model(), inputs: self.sources.inputs(), settings: self.settings.clone() }
     }
@@ -204,11 +204,11 @@ impl RefineTab {
             return match () {
                 () if made.model == now.model => Standing::Fresh,
                 () if refined == Some(&now.model) => Standing::InModel,
-                () => Standing::Stale("The model was changed after this: search again.".to_owned()),
+                () => Standing::Stale("The model has changed since. Search again.".to_owned()),
             };
         }
         let what = if made.inputs == now.inputs { "settings" } else { "logs" };
-        Standing::Stale(format!("This was made with other {what}: search again for these."))
+        Standing::Stale(format!("This result was computed with other {what}. Search again."))
     }
 
     fn standing_of_refined(&self, session: &Session) -> Option<Standing> {
@@ -222,18 +222,18 @@ impl RefineTab {
 
     fn put_into(&self, session: &mut Session) -> Result<String, String> {
         let Some(refined) = &self.run.refined else {
-            return Err("There is nothing to put into the model: search first.".to_owned());
+            return Err("There are no effects to use. Search first.".to_owned());
         };
         match self.standing_of_refined(session) {
             Some(Standing::Stale(why)) => return Err(why),
-            Some(Standing::InModel) => return Err("It is in the model already.".to_owned()),
+            Some(Standing::InModel) => return Err("The effects are already in the model.".to_owned()),
             Some(Standing::Fresh) | None => {}
         }
         let Some(chosen) = self.chosen.as_ref().filter(|chosen| **chosen != refined.made.model) else {
-            return Err("Nothing is ticked: the model stays as it is.".to_owned());
+            return Err("No effect is selected. The model is unchanged.".to_owned());
         };
         session.rig = chosen.rig.clone();
-        Ok("The model has what was found; the simulated robot too.".to_owned())
+        Ok("The effects were added to the model.".to_owned())
     }
 
     /// Ids of the effects that are found and not ticked.
@@ -251,10 +251,10 @@ impl RefineTab {
         around: &Surroundings<'_>,
     ) -> Result<(), String> {
         let Some(refined) = &self.run.refined else {
-            return Err("There is nothing to save: search first.".to_owned());
+            return Err("There is nothing to save. Search first.".to_owned());
         };
         let remark = match self.standing(refined, self.chosen.as_ref(), around.session) {
-            Standing::Stale(why) => Some(format!("Stale when it was saved. {why}")),
+            Standing::Stale(why) => Some(format!("Out of date when saved. {why}")),
             Standing::Fresh | Standing::InModel => None,
         };
         let mut document = refined.answer.document.clone();
@@ -266,11 +266,11 @@ impl RefineTab {
         let content = move || match saved_as {
             SavedAs::Report => {
                 if !left_out.is_empty() {
-                    let text = format!("{left_out}: not taken over into the model");
+                    let text = format!("{left_out}: not added to the model");
                     document.blocks.insert(0, Block::notice(ReportTone::Note, "Left out", text));
                 }
                 if let Some(row) = row {
-                    document.blocks.push(Block::paragraph(format!("In the ledger of the session: {row}.")));
+                    document.blocks.push(Block::paragraph(format!("Runs: {row}.")));
                 }
                 if let Some(remark) = said {
                     document.blocks.insert(0, Block::notice(ReportTone::Warning, "Stale", remark));
@@ -331,7 +331,7 @@ impl RefineTab {
         self.saver.drain()
     }
 
-    /// What the page shows, as `--state-out` writes it.
+    /// State of the page for `--state-out`.
     pub(crate) fn snapshot(&self, session: &Session) -> serde_json::Value {
         let standing = self.standing_of_refined(session).map(|standing| match standing {
             Standing::Fresh => "fresh",
@@ -403,12 +403,12 @@ impl RefineTab {
         ];
         if let Some((question, share)) = self.run.running() {
             let step = if question == Question::Residual { Step::Residual } else { Step::Candidates };
-            states[step as usize] = StepState::new(format!("at work, {:.0} %", 100.0 * share), Tone::Busy);
+            states[step as usize] = StepState::new(format!("computing, {:.0} %", 100.0 * share), Tone::Busy);
         }
         if let Some(Standing::Stale(_)) = standing {
             for state in &mut states[1..] {
                 if state.tone != Tone::Busy && state.tone != Tone::Open {
-                    *state = StepState::new(format!("{} · stale", state.text), Tone::Warning);
+                    *state = StepState::new(format!("{} · out of date", state.text), Tone::Warning);
                 }
             }
         }
@@ -419,7 +419,7 @@ impl RefineTab {
         if let (Some(Standing::Stale(why)), true) =
             (self.standing_of_refined(context.session), self.step != Step::Health)
         {
-            warning_ui(ui, format!("Stale. {why}"));
+            warning_ui(ui, format!("Out of date. {why}"));
         }
     }
 
@@ -427,8 +427,8 @@ impl RefineTab {
         match (self.step, self.found()) {
             (Step::Health, _) => health::ui(&self.run, &self.sources, ui),
             (Step::Residual, _) | (_, None) => {
-                let hint = "Add a log at the left and press “Find what is missing”.";
-                empty_page_ui(ui, "Nothing was searched yet.", hint, |_| {});
+                let hint = "Add a log on the left and press “Find missing effects”.";
+                empty_page_ui(ui, "No search yet.", hint, |_| {});
             }
             (Step::Candidates, Some(found)) => candidates::ui(found, ui),
             (Step::Add, Some(_)) => self.add_ui(context, ui),
@@ -480,7 +480,7 @@ impl RefineTab {
             }
         });
         if context.model_path.is_none() {
-            hint_ui(ui, "No file holds this very model: save it, put its path in place of MODEL.toml.");
+            hint_ui(ui, "This model is unsaved: save it and replace MODEL.toml by its path.");
         }
     }
 }
@@ -498,17 +498,17 @@ fn use_ui(context: &ViewContext<'_>, standing: Option<Standing>, ticked: bool, u
         let ready = ticked && matches!(standing, Some(Standing::Fresh));
         let text = RichText::new("Use in the model").strong();
         let button = egui::Button::new(text).fill(ui.visuals().selection.bg_fill);
-        let help = "Put the ticked effects and the corrected numbers into the model of this window";
+        let help = "Add the selected effects and the corrected parameters to the model of this window";
         if ui.add_enabled(ready, button).on_hover_text(help).clicked() {
             context.commands.send(Command::Refine(RefineCommand::Use));
         }
         match standing {
             Some(Standing::InModel) => {
                 let color = palette(ui.visuals()).good;
-                ui.label(RichText::new("It is in the model of this window.").color(color));
+                ui.label(RichText::new("Already in the model of this window.").color(color));
             }
             Some(Standing::Fresh) if !ticked => {
-                hint_ui(ui, "Nothing is ticked.");
+                hint_ui(ui, "No effect is selected.");
             }
             _ => {}
         }

@@ -4,12 +4,12 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
-use flqr_core::model_file::{Model, presets};
+use flqr_core::model::{Model, Motor};
+use flqr_core::model_file::presets;
 use flqr_core::record::{Log, LogKind};
 use flqr_core::refine::{
     self, Demonstration, DemonstrationError, Options, RefineError, Refinement, Residual, Truth, Verdict,
 };
-use flqr_core::robot::Motor;
 
 use super::sources::Input;
 use crate::job::{Job, Outcome, Reporter, Waker};
@@ -18,14 +18,14 @@ use crate::messages::{Said, Severity};
 use crate::runs::Sources;
 use crate::shell_word::quoted;
 
-/// What can be asked.
+/// Kinds of searches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Question {
-    /// How far the model is from the logs.
+    /// Residual from the logs.
     Residual,
-    /// What the model lacks.
+    /// Missing effects.
     Refine,
-    /// The same of a simulated robot that is recorded first.
+    /// Missing effects of a simulated robot, recorded first.
     Demo,
 }
 
@@ -40,7 +40,7 @@ impl Question {
     }
 }
 
-/// What is typed beside the logs.
+/// Typed settings besides the logs.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Settings {
     /// Motor of a robot that a bench log belongs to.
@@ -66,7 +66,7 @@ impl Settings {
     }
 }
 
-/// What an answer was made of.
+/// Inputs of a result.
 #[derive(Clone, PartialEq)]
 pub(super) struct Made {
     pub(super) model: Model,
@@ -146,14 +146,14 @@ struct Running {
     share: f64,
 }
 
-/// How a question ended.
+/// Outcome of a search.
 pub(super) struct Drained {
     pub(super) question: Question,
     /// A sentence about it.
     pub(super) said: Said,
-    /// Whether there is another answer.
+    /// True if there is another answer.
     pub(super) answered: bool,
-    /// What was recorded for it, where it was.
+    /// Recorded data, if any.
     pub(super) records: Option<Vec<LoadedLog>>,
 }
 
@@ -163,7 +163,7 @@ pub(super) struct Run {
     running: Option<Running>,
     pub(super) residual: Option<Answered<Box<Residual>>>,
     pub(super) refined: Option<Answered<Box<Refinement>>>,
-    /// What the simulated robot of the last demonstration had.
+    /// Hidden effect of the last demo.
     pub(super) truth: Option<Truth>,
     pub(super) problem: Option<String>,
     generation: u64,
@@ -187,7 +187,7 @@ impl Run {
             let made = made.clone();
             move |reporter: &Reporter<f64>| answer(question, &made, &mut |share| reporter.progress(share))
         };
-        let job = Job::start("refine", waker, work).map_err(|e| format!("No thread for the search: {e}."))?;
+        let job = Job::start("refine", waker, work).map_err(|e| format!("Cannot start the search: {e}."))?;
         self.problem = None;
         self.running = Some(Running { question, made, model_path, job, share: 0.0 });
         Ok(())
@@ -207,7 +207,7 @@ impl Run {
         let end = match outcome {
             Outcome::Running => return None,
             Outcome::Done(end) => end,
-            Outcome::Broken => End::Refused("The search failed: this is a defect of flqr".to_owned()),
+            Outcome::Broken => End::Refused("The search failed: this is an internal error".to_owned()),
         };
         let Running { question, made, model_path, .. } = self.running.take()?;
         self.generation += 1;
@@ -216,14 +216,14 @@ impl Run {
         let mut records = None;
         let severity = if matches!(end, End::Refused(_)) { Severity::Error } else { Severity::Note };
         let text = match end {
-            End::Cancelled => "Cancelled: what was found before is still shown.".to_owned(),
+            End::Cancelled => "Cancelled. The previous results are still shown.".to_owned(),
             End::Refused(problem) => {
                 self.problem = Some(problem.clone());
                 format!("{problem}.")
             }
             End::Answered(Answer::Residual(answer), sources) => {
                 self.residual = Some(Answered { made, model_path, answer, sources, generation });
-                "The residual of the model is there.".to_owned()
+                "Residual computed.".to_owned()
             }
             End::Answered(Answer::Refined(answer), sources) => {
                 let text = format!("{}.", verdict_text(&answer));
@@ -297,7 +297,7 @@ fn try_answer(
     })
 }
 
-/// Whether a model is the one that a demonstration takes.
+/// Returns whether a model is the one that a demonstration takes.
 pub(super) fn is_of_demo(model: &Model) -> bool {
     static PAPER: LazyLock<Model> = LazyLock::new(presets::paper);
     *model == *PAPER
@@ -317,6 +317,6 @@ pub(super) fn verdict_text(found: &Refinement) -> String {
             "Unexplained residual: the model lacks something that no effect of the library explains"
                 .to_owned()
         }
-        Verdict::DataUnfit => "Data unfit: the logs cannot answer, for the reasons below".to_owned(),
+        Verdict::DataUnfit => "Log not suitable for identification, for the reasons below".to_owned(),
     }
 }

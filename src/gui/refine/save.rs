@@ -7,7 +7,7 @@ use crate::command::{Command, FilePurpose};
 use crate::context::ViewContext;
 use crate::save_form::{FileKind, Layout, SaveForm, Words};
 
-/// What is saved.
+/// Format.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum SavedAs {
     /// HTML with tables and figures.
@@ -20,7 +20,7 @@ pub(crate) enum SavedAs {
 impl FileKind for SavedAs {
     const ALL: &'static [(Self, &'static str, &'static str)] = &[
         (Self::Report, "Report", "HTML with tables and figures, in one file"),
-        (Self::Model, "Model", "TOML with the effects that are ticked"),
+        (Self::Model, "Model", "TOML with the selected effects"),
     ];
 
     fn extension(self) -> &'static str {
@@ -42,7 +42,7 @@ impl SavedAs {
 }
 
 const WORDS: Words<SavedAs> = Words {
-    path: ["path to save what was found to", "The ending says what is saved: .html or .toml"],
+    path: ["path to save the results to", "The file extension selects the format: .html or .toml"],
     save: |saved_as| match saved_as {
         SavedAs::Report => "Save report",
         SavedAs::Model => "Save model",

@@ -22,7 +22,7 @@ pub(super) struct Source {
     pub(super) path: PathBuf,
     /// Takes no part in the estimates, and tells the error.
     pub(super) held_out: bool,
-    /// Whether it was made in this program, and no file has it.
+    /// True if it was made in this program, and no file has it.
     made: bool,
     /// The column map that it was loaded with.
     map: Vec<Mapping>,
@@ -30,7 +30,7 @@ pub(super) struct Source {
 }
 
 impl Source {
-    /// Whether no file has it.
+    /// Returns whether no file has it.
     pub(super) fn is_made(&self) -> bool {
         self.made
     }
@@ -43,7 +43,7 @@ pub(super) struct Input {
     pub(super) held_out: bool,
     pub(super) map: Vec<Mapping>,
     pub(super) log: Arc<Log>,
-    /// Whether no file has it.
+    /// True if no file has it.
     pub(super) made: bool,
 }
 
@@ -88,7 +88,7 @@ impl Sources {
         self.focus_path = true;
     }
 
-    /// Loads a log beside the others; one that is in the list already is loaded again.
+    /// Loads a log next to the others; one that is in the list already is loaded again.
     pub(super) fn load(&mut self, path: &Path, held_out: bool, waker: &Waker) -> Result<(), String> {
         self.dialog_problem = None;
         let map = self.column_map.parse()?;
@@ -150,7 +150,7 @@ impl Sources {
         self.list.iter().filter_map(|source| Some((source, source.loader.log()?)))
     }
 
-    /// What a question would be put to, those that are held out last.
+    /// Logs of a search, held-out logs last.
     pub(super) fn inputs(&self) -> Vec<Input> {
         let input = |(source, loaded): (&Source, &LoadedLog)| Input {
             path: source.path.clone(),
@@ -202,7 +202,7 @@ impl Sources {
             field.request_focus();
         }
         let entered = field.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
-        field.on_hover_text("Type a path and press Enter to add it (Ctrl+L comes here)");
+        field.on_hover_text("Type a path and press Enter to add it (Ctrl+L)");
         entered
     }
 
@@ -214,11 +214,11 @@ impl Sources {
             context.commands.send(Command::Refine(RefineCommand::Load { path, held_out }));
         };
         let fits = ui.add_enabled(typed, egui::Button::new("Add log"));
-        if fits.on_hover_text("The model is refined with it").clicked() || (entered && typed) {
+        if fits.on_hover_text("Used to refine the model").clicked() || (entered && typed) {
             add(false);
         }
         let held_out = ui.add_enabled(typed, egui::Button::new("Add held out"));
-        if held_out.on_hover_text("It takes no part in the estimates, and tells the error").clicked() {
+        if held_out.on_hover_text("Used for validation only").clicked() {
             add(true);
         }
         if ui.button("Open…").on_hover_text("Choose a log (Ctrl+O)").clicked() {
@@ -251,21 +251,21 @@ impl Source {
                 let (word, help) = if self.loader.is_running() {
                     ("Cancel", "Stop loading it")
                 } else {
-                    ("Remove", "Take it from the list; the file stays")
+                    ("Remove", "Remove from the list; the file is not deleted")
                 };
                 let remove = ui.small_button(word).on_hover_text(help);
                 if remove.accessible_name(format!("{word} {name}")).clicked() {
                     send(RefineCommand::Remove(self.id));
                 }
-                let help = "Read it again, with the column map above";
+                let help = "Reload with the column map above";
                 let again = ui.add_enabled(!self.made, egui::Button::new("Reload").small());
-                let again = again.on_hover_text(help).on_disabled_hover_text("No file has it");
+                let again = again.on_hover_text(help).on_disabled_hover_text("Not in a file");
                 if again.accessible_name(format!("Reload {name}")).clicked() {
                     send(RefineCommand::Load { path: self.path.clone(), held_out: self.held_out });
                 }
                 let mut held_out = self.held_out;
                 let tick = ui.checkbox(&mut held_out, RichText::new("held out").small());
-                let tick = tick.on_hover_text("It takes no part in the estimates, and tells the error");
+                let tick = tick.on_hover_text("Used for validation only");
                 if tick.accessible_name(format!("{name} held out")).changed() {
                     send(RefineCommand::HoldOut(self.id, held_out));
                 }
@@ -278,7 +278,7 @@ impl Source {
         if let Some(problem) = &self.loader.problem {
             error_ui(ui, problem);
             if self.loader.log().is_some() {
-                hint_ui(ui, "What was read of it before is still used.");
+                hint_ui(ui, "The data read before are still used.");
             }
         }
         if let Some(loaded) = self.loader.log() {

@@ -1,4 +1,4 @@
-//! Where in the loop one is: health ▸ residual ▸ candidates ▸ add ▸ before and after.
+//! Position in the loop: health ▸ residual ▸ candidates ▸ add ▸ before and after.
 
 use egui::{
     Color32, Rect, RichText, Role, Sense, StrokeKind, TextStyle, TextWrapMode, Ui, Vec2, WidgetInfo,
@@ -10,14 +10,14 @@ use crate::theme::palette;
 /// A step of the loop, and the part of the page that shows it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Step {
-    /// Whether the logs can answer.
+    /// True if the logs can answer.
     #[default]
     Health,
-    /// How far the model is from them.
+    /// Residual from them.
     Residual,
-    /// What was tried.
+    /// Candidates.
     Candidates,
-    /// What was found, and its way into the model.
+    /// Identified effects and their use in the model.
     Add,
     /// The errors of both models.
     Compare,
@@ -51,16 +51,16 @@ impl Step {
 
     fn help(self) -> &'static str {
         match self {
-            Self::Health => "Whether the logs can answer, and what is wrong with them",
-            Self::Residual => "Measured against the model, and what the difference depends on",
-            Self::Candidates => "Every effect that was tried, and what became of it",
-            Self::Add => "What the logs show that the model lacks, and its way into the model",
-            Self::Compare => "Errors on rows that took no part in the estimates",
+            Self::Health => "Quality of the logs and their problems",
+            Self::Residual => "Difference between measurement and model, and the variables it depends on",
+            Self::Candidates => "All candidate effects and their outcomes",
+            Self::Add => "Identified effects and their use in the model",
+            Self::Compare => "Errors on held-out rows",
         }
     }
 }
 
-/// How a step stands.
+/// State of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Tone {
     /// Nothing there yet.
@@ -72,7 +72,7 @@ pub(super) enum Tone {
     Error,
 }
 
-/// How a step stands, in a few words.
+/// Short state of a step.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct StepState {
     pub(super) text: String,
@@ -138,7 +138,7 @@ fn step_ui(shown: &mut Step, step: Step, state: &StepState, ui: &mut Ui, size: V
     }
 }
 
-/// One line of a step, centred, at a share of its height, cut short where it is too long.
+/// One line of a step, centred, at a fraction of its height, cut short where it is too long.
 fn line_ui(text: RichText, rect: Rect, height: f32, ui: &Ui) {
     let width = (rect.width() - 8.0).max(1.0);
     let text: WidgetText = text.into();

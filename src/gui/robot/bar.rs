@@ -24,7 +24,7 @@ pub(crate) fn bar_ui(link: &Link, (source, tab): (Source, Tab), commands: &Comma
         chip_ui(link, ui);
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let stop = link.may_drive() && stop_ui(ui, vec2(150.0, STOP_HEIGHT)).clicked();
-            // These two pages have it beside the differences.
+            // These two pages have it next to the differences.
             if !matches!(tab, Tab::Tune | Tab::Robot) {
                 apply_ui(link, commands, ui);
             }
@@ -44,7 +44,7 @@ pub(crate) fn bar_ui(link: &Link, (source, tab): (Source, Tab), commands: &Comma
 pub(crate) fn stop_ui(ui: &mut Ui, size: egui::Vec2) -> Response {
     let text = RichText::new("STOP   Esc, Space").strong().color(Color32::WHITE);
     let button = Button::new(text).fill(STOP_FILL).min_size(size);
-    ui.add(button).accessible_name("STOP").on_hover_text("No torque, motors off, at once (Esc or Space)")
+    ui.add(button).accessible_name("STOP").on_hover_text("No torque, motors off, immediately (Esc or Space)")
 }
 
 /// Name of a stage, for people.
@@ -93,41 +93,42 @@ fn text_ui(link: &Link, (source, tab): (Source, Tab), commands: &Commands, ui: &
     ui.add(Label::new(if good { text } else { text.strong().color(colors.warning) }).truncate());
 }
 
-/// Why, and the mend, in a sentence.
+/// Describes the reason and the remedy in one sentence.
 pub(super) fn stopped(reason: &StopReason) -> String {
     let text = sentence(&reason.to_string());
-    mend(reason).map_or_else(|| text.clone(), |mend| format!("{text} {mend}"))
+    remedy(reason).map_or_else(|| text.clone(), |remedy| format!("{text} {remedy}"))
 }
 
-/// The mend, where the reason itself does not say it.
-fn mend(reason: &StopReason) -> Option<&'static str> {
+/// The remedy, where the reason itself does not say it.
+fn remedy(reason: &StopReason) -> Option<&'static str> {
     Some(match reason {
-        StopReason::Asked => "Release to arm again.",
+        StopReason::Requested => "Release it to arm again.",
         StopReason::Done => "Its recording can be fitted on the Friction tab.",
         StopReason::Tilt { .. } => {
-            "Stand it upright; look at the signs of IMU and motors if it fell at once."
+            "Set the robot upright. Check the signs of IMU and motors if it fell immediately."
         }
         StopReason::Speed { .. } | StopReason::Distance { .. } => {
-            "Put it back; raise the limit under [safety] of the model if it has the room."
+            "Put it back, or raise the limit in [safety] of the model."
         }
         StopReason::MotorSpeed { .. } => {
-            "Put the wheels on the ground, or raise motor_speed_rad_s under [safety]."
+            "Put the wheels on the ground, or raise motor_speed_rad_s in [safety]."
         }
-        StopReason::MotorError { .. } => "Take the cause away, then switch the motor off and on.",
-        StopReason::NotFinite => "Look at the raw frames and at the scales under [link] of the model.",
+        StopReason::MotorError { .. } => "Remove the cause, then power-cycle the motor.",
+        StopReason::NotFinite => "Check the raw frames and the scales in [link] of the model.",
         _ => return None,
     })
 }
 
-/// How the connection stands, and whether that is as it should be.
+/// State of the connection, and whether it is normal.
 pub(super) fn connection_text(link: &Link) -> (String, bool) {
     let Some(status) = &link.status else {
-        let text = if link.is_opening() { "connecting…" } else { "open, waiting for the first readings" };
+        let text =
+            if link.is_opening() { "connecting…" } else { "open, waiting for the first measurements" };
         return (text.to_owned(), true);
     };
     match &status.connection {
         Connection::Connected if !link.may_drive() && !link.is_replay() => {
-            ("connected; listening only, nothing is sent".to_owned(), true)
+            ("connected; listen-only, nothing is sent".to_owned(), true)
         }
         Connection::Connected if link.is_replay() && link.replay_is_paused => ("paused".to_owned(), true),
         Connection::Connected if link.is_replay() => ("playing".to_owned(), true),
@@ -135,15 +136,15 @@ pub(super) fn connection_text(link: &Link) -> (String, bool) {
             ("connected; not armed, nothing is sent".to_owned(), true)
         }
         Connection::Connected if link.stage() == Some(Stage::Checking) => {
-            ("motors are asked for readings, without torque".to_owned(), true)
+            ("querying the motors, without torque".to_owned(), true)
         }
         Connection::Connected if link.stage() == Some(Stage::Driving) => {
             ("the motors are driven".to_owned(), true)
         }
         Connection::Connected => ("connected".to_owned(), true),
         Connection::Silent { hint } => (format!("silent: {hint}"), false),
-        Connection::Lost { reason } => (format!("lost, trying again: {reason}"), false),
-        Connection::Ended => ("the recording has come to its end".to_owned(), true),
+        Connection::Lost { reason } => (format!("connection lost, reconnecting: {reason}"), false),
+        Connection::Ended => ("end of the recording".to_owned(), true),
     }
 }
 
@@ -151,7 +152,7 @@ fn rates_ui(link: &Link, ui: &mut Ui) {
     let Some(status) = link.status.as_ref().filter(|_| link.is_open()) else { return };
     let text = format!("{:>4} rows/s {:>5.0} frames/s", link.rows_hz(), status.counters.received_hz);
     ui.label(RichText::new(text).small().monospace().weak())
-        .on_hover_text("Rows of the robot log and frames from the bus over the last second");
+        .on_hover_text("Robot-log rows and bus frames in the last second");
 }
 
 fn recording_ui(link: &Link, ui: &mut Ui) {
@@ -166,14 +167,14 @@ fn recording_ui(link: &Link, ui: &mut Ui) {
     ui.label(RichText::new(text).strong().color(color)).on_hover_text(help);
 }
 
-/// What a session can be told while it replays.
+/// Commands of a session during replay.
 pub(super) fn replay_ui(context: &ViewContext<'_>, speed: &mut f64, ui: &mut Ui) {
     let paused = context.link.replay_is_paused;
     ui.horizontal(|ui| {
         let (name, help) = if paused {
-            ("Run", "Let the replay go on (Ctrl+P)")
+            ("Run", "Resume the replay (Ctrl+P)")
         } else {
-            ("Pause", "Hold the replay (Ctrl+P)")
+            ("Pause", "Pause the replay (Ctrl+P)")
         };
         if ui.add(Button::new(name).min_size(vec2(56.0, 0.0))).on_hover_text(help).clicked() {
             context.commands.send(Command::Order(SessionOrder::Pause(!paused)));
@@ -181,6 +182,6 @@ pub(super) fn replay_ui(context: &ViewContext<'_>, speed: &mut f64, ui: &mut Ui)
         if super::form::speed_ui(speed, ui) {
             context.commands.send(Command::Order(SessionOrder::ReplaySpeed(*speed)));
         }
-        ui.weak(format!("of real time: {} ×", plain(*speed, 2)));
+        ui.weak(format!("real time × {}", plain(*speed, 2)));
     });
 }

@@ -1,10 +1,10 @@
-//! How motors, IMU, bus and control loop stand, a card each.
+//! Status cards of motors, IMU, bus and control loop.
 
 use std::time::Duration;
 
 use egui::{Align, Color32, Frame, Label, Layout, Margin, ProgressBar, Rect, RichText, Ui, UiBuilder, vec2};
 use flqr_core::device::{Counters, ImuStatus, MotorStatus, Status};
-use flqr_core::robot::Motor;
+use flqr_core::model::Motor;
 
 use super::jitter::jitter_ui;
 use crate::theme::palette;
@@ -72,7 +72,7 @@ fn motor_ui(motor: Motor, status: &MotorStatus, ui: &mut Ui) {
     row_ui(ui, "missed replies", &status.missed.to_string(), (status.missed > 0).then_some(colors.warning));
     if let Some(round_trip) = status.health.and_then(|health| health.round_trip) {
         row_ui(ui, "round trip", &with_unit(Some(1e3 * round_trip.as_secs_f64()), 1, "ms"), None)
-            .on_hover_text("Time from a query to its reply");
+            .on_hover_text("Round-trip time of a query");
     }
     row_ui(ui, "temperature", &with_unit(status.temperature_c, 0, "°C"), None);
     let voltage = status.health.map(|health| health.voltage_v);
@@ -91,7 +91,8 @@ fn motor_ui(motor: Motor, status: &MotorStatus, ui: &mut Ui) {
             true => "on",
             false => "off",
         };
-        row_ui(ui, "power", power, None).on_hover_text("As the motor said last; nothing once that is old");
+        row_ui(ui, "power", power, None)
+            .on_hover_text("Last value reported by the motor; empty when outdated");
     }
     if health.errors.is_none() {
         row_ui(ui, "errors", "none", (!is_old).then_some(colors.good));
@@ -128,11 +129,11 @@ fn bus_ui(counters: &Counters, ui: &mut Ui) {
         ("reconnects", counters.reconnects),
     ] {
         row_ui(ui, name, &count.to_string(), (count > 0).then_some(warning)).on_hover_text(match name {
-            "dropped" => "Frames that the system or the adapter dropped before they were read",
-            "lost" => "Frames and samples that did not reach the control loop, the window or the recording",
-            "late" => "Ticks of the control loop that came a period late or later",
+            "dropped" => "Frames dropped by the system or the adapter",
+            "lost" => "Frames and samples lost before the control loop, the window or the recording",
+            "late" => "Control-loop ticks at least one period late",
             "errors" => "Error frames and damaged lines",
-            _ => "Times the bus was lost and came back",
+            _ => "Number of reconnections of the bus",
         });
     }
 }
@@ -145,7 +146,7 @@ fn load_ui(load: Option<f64>, ui: &mut Ui) {
             let text = RichText::new(text).small();
             let bar = ProgressBar::new(load.unwrap_or(0.0) as f32).desired_height(14.0).corner_radius(3);
             ui.add(bar.text(text)).on_hover_text(
-                "Share of the bus that frames took over the last second, stuffing included; unknown without a bit rate",
+                "Bus load in the last second, including bit stuffing; unknown without a bit rate",
             );
         });
     });

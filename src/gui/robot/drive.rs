@@ -1,4 +1,4 @@
-//! Arming in two steps, what is checked before, and the controller in force.
+//! Arming in two steps, what is checked before, and the controller active.
 
 use egui::{Button, RichText, Ui, vec2};
 use flqr_core::control::ControllerKind;
@@ -40,8 +40,8 @@ fn task_ui(context: &ViewContext<'_>, ui: &mut Ui) {
         return;
     };
     let (text, balances) = match excitation {
-        Excitation::Balance => ("It is to balance.".to_owned(), true),
-        Excitation::BalanceMultisine => ("It is to balance, with a multisine on top.".to_owned(), true),
+        Excitation::Balance => ("Task: balance.".to_owned(), true),
+        Excitation::BalanceMultisine => ("Task: balance with a multisine.".to_owned(), true),
         Excitation::SpeedSweep { seconds } => {
             (format!("Wheels in the air: constant speeds, {seconds} s."), false)
         }
@@ -55,7 +55,7 @@ fn task_ui(context: &ViewContext<'_>, ui: &mut Ui) {
         let mut kind = context.session.controller;
         let choices = [
             (ControllerKind::Lqr, "LQR", "Without friction feedforward"),
-            (ControllerKind::Flqr, "FLQR", "With the friction of each motor fed forward"),
+            (ControllerKind::Flqr, "FLQR", "With friction feedforward for each motor"),
         ];
         ui.scope(|ui| {
             if choice_ui(ui, &mut kind, &choices) {
@@ -86,16 +86,16 @@ fn steps_ui(context: &ViewContext<'_>, ui: &mut Ui) {
             let button = Button::new(name).min_size(vec2(width, 28.0));
             ui.add_enabled(enabled, button).on_hover_text(help).on_disabled_hover_text(why_not).clicked()
         };
-        let help = "First step: ask the motors for readings, without torque, and check all";
+        let help = "Step 1: query the motors without torque and run the checks";
         if button(ui, "1  Check", stage == Some(Stage::Listening), help, "Only while listening") {
             order(DriveOrder::Check);
         }
-        let help = "Second step: motors on; they follow the controller";
+        let help = "Step 2: switch the motors on; they follow the controller";
         if button(ui, "2  Arm", link.may_arm(), help, "Only after all checks have passed") {
             order(DriveOrder::Arm);
         }
         let held = matches!(stage, Some(Stage::Checking | Stage::Stopped(_)));
-        if button(ui, "Release", held, "Back to listening", "Only after a stop, or in place of arming") {
+        if button(ui, "Release", held, "Back to listening", "Only after a stop, or instead of arming") {
             order(DriveOrder::Release);
         }
     });

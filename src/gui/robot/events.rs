@@ -42,7 +42,7 @@ impl EventLog {
     pub(super) fn ui(&self, ui: &mut Ui) {
         section_ui(ui, "Events", |_| {});
         if self.events.is_empty() {
-            hint_ui(ui, "Stops, warnings and reconnects are listed here.");
+            hint_ui(ui, "Stops, warnings and reconnections are listed here.");
             return;
         }
         let colors = palette(ui.visuals());

@@ -1,4 +1,4 @@
-//! Where sessions and lists of interfaces come from, apart from what the window does with them.
+//! Source of sessions and interface lists, separate from their use in the window.
 
 use std::fmt;
 
@@ -14,19 +14,19 @@ pub trait RobotFeed: Send {
     /// All updates since the last call. Never waits.
     fn poll(&mut self) -> Vec<Update>;
 
-    /// Whether it has ended although nobody asked for it.
+    /// Returns whether it has ended although nobody requested it.
     fn has_died(&self) -> bool;
 }
 
-/// What opens robots, and knows where they could be.
+/// Opens robots and lists possible connections.
 pub trait Devices: fmt::Debug + Send + Sync {
     /// Opens a session, which calls `wake` when it has something to tell. May wait.
     ///
     /// # Errors
-    /// One sentence: what, where, the mend.
+    /// One sentence: what, where, the remedy.
     fn open(&self, options: SessionOptions, wake: Waker) -> Result<Box<dyn RobotFeed>, String>;
 
-    /// What there is to connect to. May wait.
+    /// Lists possible connections. May block.
     fn interfaces(&self) -> Interfaces;
 }
 

@@ -1,4 +1,4 @@
-//! What to connect to, and what may be done with it.
+//! Connection settings and permissions.
 
 use std::path::Path;
 
@@ -12,8 +12,8 @@ use flqr_core::device::{
 use flqr_core::link::dbc::Choice;
 use serde::{Deserialize, Serialize};
 
+use super::discovery::{can_ui, ports_ui};
 use super::link::sentence;
-use super::offers::{can_ui, ports_ui};
 use crate::command::{Command, FilePurpose, Source};
 use crate::context::ViewContext;
 use crate::design::Designer;
@@ -27,7 +27,7 @@ pub(super) const REPLAY_SPEEDS: [f64; 2] = [0.1, 100.0];
 /// Shortest and longest run with the wheels in the air, s.
 const AIR_SECONDS: [f64; 2] = [1.0, 600.0];
 
-/// What the motors are to do.
+/// Task of the motors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Task {
     Balance,
@@ -50,16 +50,14 @@ impl Task {
 
     fn help(self) -> &'static str {
         match self {
-            Self::Balance => "The controller of the Tune tab keeps the robot upright.",
+            Self::Balance => "The controller of the Tune tab balances the robot.",
             Self::BalanceMultisine => {
-                "The controller keeps the robot upright; torques of many frequencies on top, for refining its model."
+                "The controller balances the robot with added multisine torques, to refine its model."
             }
             Self::SpeedSweep => {
-                "Lift the robot: both wheels turn at constant speeds, one after the other, for a fit of friction."
+                "Lift the robot: both wheels turn at a sequence of constant speeds, to fit friction."
             }
-            Self::Multisine => {
-                "Lift the robot: torques of many frequencies, for a fit of friction and inertia."
-            }
+            Self::Multisine => "Lift the robot: multisine torques, to fit friction and inertia.",
         }
     }
 
@@ -68,7 +66,7 @@ impl Task {
     }
 }
 
-/// What has been typed and chosen.
+/// Typed and selected settings.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub(crate) struct ConnectionForm {
@@ -88,7 +86,7 @@ pub(crate) struct ConnectionForm {
     #[serde(skip)]
     task: Task,
     air_s: f64,
-    /// Why there is no file dialog.
+    /// Reason why there is no file dialog.
     #[serde(skip)]
     pub(super) dialog_problem: Option<String>,
 }
@@ -142,7 +140,7 @@ impl ConnectionForm {
         model: Option<&Path>,
     ) -> Result<String, String> {
         if source == Source::Simulated {
-            return Err("The simulated robot needs no connection: see the Experiments page.".to_owned());
+            return Err("The simulated robot needs no connection. See the Experiments page.".to_owned());
         }
         let options = self.options(source, session, designer)?;
         Ok(crate::command_line::robot(&options, &self.signal_words(), controller, model))
@@ -169,7 +167,7 @@ impl ConnectionForm {
         Ok(())
     }
 
-    /// What to open; one sentence where something is missing.
+    /// Options of the connection; an error sentence if something is missing.
     pub(crate) fn options(
         &self,
         source: Source,
@@ -181,7 +179,7 @@ impl ConnectionForm {
         let mode = if self.may_drive && source != Source::Replay {
             let gain = designer.in_force.map(|designed| designed.design.gain);
             let controller = gain.and_then(|gain| session.balance_controller(gain));
-            let controller = controller.ok_or("There is no design to drive with: change the weights.")?;
+            let controller = controller.ok_or("There is no design to drive with. Change the weights.")?;
             SessionMode::Drive { controller: Box::new(controller), excitation: self.excitation() }
         } else {
             SessionMode::Listen
@@ -200,7 +198,7 @@ impl ConnectionForm {
 
     fn source(&self, source: Source) -> Result<DeviceSource, String> {
         let typed = |text: &str, what: &str| match text.trim() {
-            "" => Err(format!("{what} is empty: choose or type one.")),
+            "" => Err(format!("{what} is empty. Choose or type one.")),
             text => Ok(text.to_owned()),
         };
         Ok(match source {
@@ -237,10 +235,12 @@ impl ConnectionForm {
             .map(|word| word.parse::<Choice>().map_err(|error| sentence(&error.to_string())));
         let signals = signals.collect::<Result<Vec<_>, _>>()?;
         if signals.is_empty() {
-            return Err("No signal of the DBC file is chosen: type for instance pitch=Imu.Pitch.".to_owned());
+            return Err("No signal of the DBC file is selected. Type for example pitch=Imu.Pitch.".to_owned());
         }
         if self.may_drive && source != Source::Replay {
-            return Err("A robot of a DBC file can be watched only: choose “Listen only”.".to_owned());
+            return Err(
+                "A robot described by a DBC file can only be monitored. Choose “Listen only”.".to_owned()
+            );
         }
         Ok(Some(Described { file: file.into(), signals }))
     }
@@ -258,7 +258,7 @@ impl ConnectionForm {
     pub(super) fn ui(&mut self, context: &ViewContext<'_>, found: Option<&Interfaces>, ui: &mut Ui) {
         let wired = matches!(context.source, Source::Can | Source::Slcan);
         section_ui(ui, "Connection", |ui| {
-            let help = "Look for interfaces and ports again";
+            let help = "Refresh the list of interfaces and ports";
             if wired && ui.button("Refresh").on_hover_text(help).clicked() {
                 context.commands.send(Command::RefreshInterfaces);
             }
@@ -266,10 +266,7 @@ impl ConnectionForm {
         match context.source {
             Source::Simulated => {}
             Source::Emulated => {
-                hint_ui(
-                    ui,
-                    "A robot emulated in this program speaks the real robot's bytes: everything can be tried without hardware.",
-                );
+                hint_ui(ui, "Emulates a robot with the real protocols in this program, without hardware.");
             }
             Source::Can => self.can_ui(found, ui),
             Source::Slcan => self.slcan_ui(found, ui),
@@ -347,7 +344,7 @@ impl ConnectionForm {
 
     fn dbc_ui(&mut self, ui: &mut Ui) {
         CollapsingHeader::new("Another robot (DBC file)").show(ui, |ui| {
-            hint_ui(ui, "For a robot without LK motors: the file that describes its frames, and what its signals are.");
+            hint_ui(ui, "For a robot without LK motors: file that describes its frames, and the mapping of its signals.");
             let field = |text, hint| TextEdit::singleline(text).hint_text(hint).desired_width(f32::INFINITY);
             ui.add(field(&mut self.dbc, "none: LK motors")).accessible_name("DBC file");
             let signals = TextEdit::multiline(&mut self.signals)
@@ -355,7 +352,7 @@ impl ConnectionForm {
                 .desired_rows(3)
                 .desired_width(f32::INFINITY);
             ui.add(signals).accessible_name("signals of the DBC file").on_hover_text(
-                "One a line: a column of the robot log, =, and MESSAGE.SIGNAL, with *FACTOR where its unit does not tell",
+                "One per line: COLUMN=MESSAGE.SIGNAL, with *FACTOR if the unit is unclear",
             );
         });
     }
@@ -364,14 +361,14 @@ impl ConnectionForm {
         section_ui(ui, "Purpose", |ui| {
             ui.scope(|ui| {
                 let choices = [
-                    (true, "May drive", "Listens until armed in two steps"),
-                    (false, "Listen only", "Nothing is sent, whatever is pressed later"),
+                    (true, "May drive", "Listens until it is armed in two steps"),
+                    (false, "Listen only", "Nothing is ever sent"),
                 ];
                 choice_ui(ui, &mut self.may_drive, &choices);
             });
         });
         if !self.may_drive {
-            hint_ui(ui, "Not one frame is sent: the bus is only listened to.");
+            hint_ui(ui, "Listen-only: no frame is sent.");
             return;
         }
         self.task_ui(ui);
@@ -380,7 +377,7 @@ impl ConnectionForm {
         if wired && robot.is_some_and(|robot| robot.link.torque_constant_nm_a.is_none()) {
             warning_ui(
                 ui,
-                "The model has no torque_constant_nm_a under [link] (0.32 or 0.81 N m/A, by the winding): without it no torque can be asked for.",
+                "The model has no torque_constant_nm_a in [link] (0.32 or 0.81 N m/A, depending on the winding), which is needed to command torque.",
             );
         }
     }
@@ -401,7 +398,7 @@ impl ConnectionForm {
             ui.horizontal(|ui| {
                 ui.label("duration");
                 number_ui(ui, &mut self.air_s, "duration with the wheels in the air", 52.0)
-                    .on_hover_text("1 to 600 s in all");
+                    .on_hover_text("1 to 600 s in total");
                 self.air_s = self.air_s.clamp(AIR_SECONDS[0], AIR_SECONDS[1]);
                 ui.label("s");
             });
@@ -455,7 +452,7 @@ fn rate(text: &str, what: &str) -> Result<u32, String> {
     let digits: String = text.chars().filter(|letter| !letter.is_whitespace()).collect();
     match digits.parse() {
         Ok(rate) if rate > 0 => Ok(rate),
-        _ => Err(format!("{what} is no whole number above 0: {text:?}.")),
+        _ => Err(format!("{what} must be a whole number above 0, not {text:?}.")),
     }
 }
 

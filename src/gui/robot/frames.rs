@@ -5,9 +5,9 @@ use std::fmt::Write;
 
 use egui::{Label, RichText, ScrollArea, TextEdit, Ui};
 use flqr_core::link::{Direction, FrameId, StampedFrame};
-use flqr_core::robot::LinkSettings;
+use flqr_core::model::LinkSettings;
 
-use super::meaning::meaning;
+use super::frame_decoder::decoded;
 use crate::widgets::{choice_ui, hint_ui, mono, section_ui};
 
 /// Frames that are kept, before and after the filter.
@@ -46,7 +46,7 @@ impl Filter {
         let id = |word: &str| {
             let digits = word.trim_start_matches("0x").trim_start_matches("0X");
             u32::from_str_radix(digits, 16)
-                .map_err(|_| format!("{word:?} is no identifier: give hexadecimal ones, as 141"))
+                .map_err(|_| format!("{word:?} is not an identifier: give hexadecimal numbers, such as 141"))
         };
         let ids = words.map(id).collect::<Result<_, _>>()?;
         let text = self.text.trim().to_lowercase();
@@ -73,7 +73,7 @@ impl Test {
             push(buffer, format_args!("{byte:02x}"));
         }
         buffer.contains(&self.text)
-            || meaning(stamped, settings).is_some_and(|text| text.to_lowercase().contains(&self.text))
+            || decoded(stamped, settings).is_some_and(|text| text.to_lowercase().contains(&self.text))
     }
 }
 
@@ -131,10 +131,10 @@ impl FrameTable {
     pub(super) fn ui(&mut self, ui: &mut Ui) {
         section_ui(ui, "Raw frames", |ui| {
             ui.toggle_value(&mut self.held, "Hold")
-                .on_hover_text("Keep these frames in view; nothing else stops");
+                .on_hover_text("Freeze this view; everything else continues");
             let count = format!("{} of {}", self.shown.len(), self.all.len());
             ui.label(RichText::new(count).small().weak())
-                .on_hover_text(format!("Frames that pass the filter, of the newest {KEPT}"));
+                .on_hover_text(format!("Frames matching the filter, of the newest {KEPT}"));
         });
         let before = self.filter.clone();
         self.filter_ui(ui);
@@ -158,7 +158,7 @@ impl FrameTable {
             let field = TextEdit::singleline(&mut self.filter.text).hint_text("any").desired_width(110.0);
             ui.add(field)
                 .accessible_name("bytes or text to show")
-                .on_hover_text("Hexadecimal bytes (9C 20), or a word of the meaning");
+                .on_hover_text("Hexadecimal bytes (9C 20), or part of the decoded text");
             ui.scope(|ui| {
                 let choices = [
                     (Way::Both, "all", "Both directions"),
@@ -174,7 +174,7 @@ impl FrameTable {
         let head = format!("{:>11}  {:2}  {:>8}  {:1}  {:23}  meaning", "time [s]", "", "id", "n", "bytes");
         ui.add(Label::new(mono(head).weak()).truncate());
         if self.shown.is_empty() {
-            let text = if self.all.is_empty() { "No frame yet." } else { "No frame passes the filter." };
+            let text = if self.all.is_empty() { "No frame yet." } else { "No frame matches the filter." };
             hint_ui(ui, text);
         }
         ui.spacing_mut().item_spacing.y = 1.0;
@@ -213,7 +213,7 @@ fn line(stamped: &StampedFrame, settings: &LinkSettings) -> String {
     while text.len() < start + 25 {
         text.push(' ');
     }
-    text.push_str(&meaning(stamped, settings).unwrap_or_default());
+    text.push_str(&decoded(stamped, settings).unwrap_or_default());
     text
 }
 

@@ -19,15 +19,15 @@ const LABELLED: [(f64, &str); 5] =
 pub(super) fn jitter_ui(timing: &Timing, ui: &mut Ui) {
     title_ui(ui, "Loop jitter");
     if timing.ticks == 0 {
-        hint_ui(ui, "No control loop has ticked: a recording has none.");
+        hint_ui(ui, "No control loop (a recording has none).");
         return;
     }
     let color = (timing.skipped > 0).then(|| palette(ui.visuals()).warning);
     let lateness = format!("{} / {}", text(timing.median_s), text(timing.p99_s));
-    row_ui(ui, "p50 / p99", &lateness, None).on_hover_text("Half and 99 % of the ticks were not later");
+    row_ui(ui, "p50 / p99", &lateness, None).on_hover_text("Median and 99th percentile of the lateness");
     row_ui(ui, "max", &text(timing.greatest_s), None);
     row_ui(ui, "ticks, skipped", &format!("{}, {}", timing.ticks, timing.skipped), color)
-        .on_hover_text("Ticks so far, and those left out because the one before took too long");
+        .on_hover_text("Number of ticks, and ticks skipped because the previous one took too long");
     histogram_ui(timing, ui);
 }
 
@@ -59,7 +59,7 @@ fn histogram_ui(timing: &Timing, ui: &mut Ui) {
         painter.text(pos2(x, area.max.y), Align2::CENTER_BOTTOM, label, FontId::proportional(10.0), color);
     }
     response.on_hover_ui(|ui| {
-        ui.label("Ticks by lateness (the height grows with the logarithm of their number)");
+        ui.label("Histogram of tick lateness (logarithmic count)");
         for (bin, count) in timing.histogram.iter().enumerate().filter(|(_, count)| **count > 0) {
             let bin = match Timing::EDGES_S.get(bin) {
                 Some(edge) => format!("up to {:>7}", text(*edge)),

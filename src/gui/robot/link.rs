@@ -29,12 +29,12 @@ enum State {
 pub(crate) struct Link {
     devices: Arc<dyn Devices>,
     state: State,
-    /// What the session was opened with; of one that has been closed too.
+    /// Options of the session, also after it was closed.
     options: Option<SessionOptions>,
     closing: Option<JoinHandle<()>>,
     /// When a step of arming was last commanded, until an update surely knows of it.
     arming: Option<Instant>,
-    /// Whether that was the step that switches the motors on.
+    /// True if that was the step that switches the motors on.
     arms: bool,
     pub(crate) transfer: Transfer,
     interval: Duration,
@@ -42,7 +42,7 @@ pub(crate) struct Link {
     pub(crate) status: Option<Status>,
     pub(crate) rows: u64,
     pub(crate) replay_is_paused: bool,
-    /// Why the last attempt to connect failed.
+    /// Reason why the last attempt to connect failed.
     pub(crate) problem: Option<String>,
 }
 
@@ -77,17 +77,17 @@ impl Link {
         matches!(self.state, State::Opening(_))
     }
 
-    /// Whether the session of before still lets go of its ports.
+    /// Returns whether the session of before still lets go of its ports.
     pub(crate) fn is_closing(&self) -> bool {
         self.closing.as_ref().is_some_and(|thread| !thread.is_finished())
     }
 
-    /// What the session is open, or opened, with.
+    /// Options of the current session.
     pub(crate) fn options(&self) -> Option<&SessionOptions> {
         self.options.as_ref().filter(|_| !matches!(self.state, State::Closed))
     }
 
-    /// Whether the session may ever send anything.
+    /// Returns whether the session may ever send anything.
     pub(crate) fn may_drive(&self) -> bool {
         self.options().is_some_and(|options| matches!(options.mode, SessionMode::Drive { .. }))
     }
@@ -96,7 +96,7 @@ impl Link {
         self.options().is_some_and(|options| matches!(options.source, Source::Replay { .. }))
     }
 
-    /// How far the robot is from being driven; none without a session.
+    /// Stage of the robot; `None` without a session.
     pub(crate) fn stage(&self) -> Option<Stage> {
         if !self.is_open() {
             return None;
@@ -105,19 +105,19 @@ impl Link {
         Some(drive.map_or(Stage::Listening, |drive| drive.stage))
     }
 
-    /// Whether motors are asked for anything, or may be from one moment to the next.
+    /// Returns whether motors are requested anything, or may be from one moment to the next.
     pub(crate) fn is_hot(&self) -> bool {
         self.may_drive()
             && (self.arming.is_some() || matches!(self.stage(), Some(Stage::Checking | Stage::Driving)))
     }
 
-    /// Whether the motors follow the controller, or may from one moment to the next.
+    /// Returns whether the motors follow the controller, or may from one moment to the next.
     pub(crate) fn is_driven(&self) -> bool {
         let arms = self.arms && self.arming.is_some();
         self.may_drive() && (arms || self.stage() == Some(Stage::Driving))
     }
 
-    /// Whether the second step of arming may be taken.
+    /// Returns whether the second step of arming may be taken.
     pub(crate) fn may_arm(&self) -> bool {
         let drive = self.status.as_ref().and_then(|status| status.drive.as_ref());
         self.is_open()
@@ -149,7 +149,7 @@ impl Link {
         };
         match Job::start("open-session", waker, work) {
             Ok(job) => self.state = State::Opening(job),
-            Err(error) => self.problem = Some(format!("No thread to connect: {error}.")),
+            Err(error) => self.problem = Some(format!("Cannot start connecting: {error}.")),
         }
     }
 
@@ -240,7 +240,7 @@ impl Link {
         self.send(SessionOrder::Interval(interval));
     }
 
-    /// What has come since the last call; a sentence if the session was opened or refused.
+    /// Takes new data since the last call; returns a sentence if the session was opened or refused.
     pub(crate) fn drain(&mut self) -> (Vec<Update>, Option<Result<String, String>>) {
         let message = self.take_opened();
         let State::Open(feed) = &mut self.state else { return (Vec::new(), message) };
@@ -263,7 +263,7 @@ impl Link {
         if died {
             self.state = State::Closed;
             self.arming = None;
-            let problem = "The session with the robot has ended by itself: this is a defect of flqr. Switch the robot off by hand if it still moves.";
+            let problem = "The connection to the robot has ended unexpectedly: this is an internal error. Switch the robot off manually if it still moves.";
             self.problem = Some(problem.to_owned());
             return (updates, Some(Err(problem.to_owned())));
         }
@@ -275,7 +275,7 @@ impl Link {
         let result = match job.poll().1 {
             Outcome::Running => return None,
             Outcome::Done(result) => result,
-            Outcome::Broken => Err("Connecting failed: this is a defect of flqr.".to_owned()),
+            Outcome::Broken => Err("Connecting failed: this is an internal error.".to_owned()),
         };
         Some(match result {
             Ok(mut feed) => {

@@ -2,15 +2,15 @@
 
 mod bar;
 mod cards;
+mod discovery;
 mod drive;
 mod events;
 mod feed;
 mod form;
+mod frame_decoder;
 mod frames;
 mod jitter;
 mod link;
-mod meaning;
-mod offers;
 mod record;
 mod snapshot;
 mod transfer;
@@ -21,7 +21,7 @@ use std::sync::Arc;
 use egui::{Button, Frame, Label, Margin, RichText, ScrollArea, Sense, Ui, UiBuilder, vec2};
 use flqr_core::control::drive::Stage;
 use flqr_core::device::{Connection, Interfaces, SessionOptions, Source as DeviceSource, Update};
-use flqr_core::robot::LinkSettings;
+use flqr_core::model::LinkSettings;
 
 use crate::command::{Command, FilePurpose, Source};
 use crate::context::ViewContext;
@@ -159,10 +159,7 @@ impl RobotTab {
     fn side_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) -> bool {
         if context.source == Source::Simulated {
             section_ui(ui, "Connection", |_| {});
-            hint_ui(
-                ui,
-                "The source is the simulated robot: it runs in this program and needs no connection.",
-            );
+            hint_ui(ui, "The source is the simulated robot, which needs no connection.");
             return false;
         }
         if !context.link.is_open() {
@@ -183,7 +180,7 @@ impl RobotTab {
             let (name, help) = if context.link.is_replay() {
                 ("Close", "Close the recording")
             } else {
-                ("Disconnect", "Close the connection; a driven robot is stopped, any other is left alone")
+                ("Disconnect", "Close the connection; a robot being driven is stopped")
             };
             if ui.button(name).on_hover_text(help).clicked() {
                 context.commands.send(Command::Disconnect);
@@ -241,16 +238,16 @@ enum Part {
     Robot,
 }
 
-/// Why the robot was stopped, or why nothing is heard, in large letters, with the mend.
+/// Reason for a stop or for missing data in large letters, with the remedy.
 fn banner_ui(context: &ViewContext<'_>, ui: &mut Ui) {
     let colors = palette(ui.visuals());
     let connection = context.link.status.as_ref().map(|status| &status.connection);
     let (title, text, color) = match (context.link.stage(), connection) {
-        (None, _) => ("Disconnected", "These are the last readings.".to_owned(), colors.reference),
+        (None, _) => ("Disconnected", "These are the last measurements.".to_owned(), colors.reference),
         (Some(Stage::Stopped(reason)), _) => ("Stopped", bar::stopped(&reason), colors.error),
         (_, Some(Connection::Silent { hint })) => ("Silent", link::sentence(hint), colors.warning),
         (_, Some(Connection::Lost { reason })) => {
-            ("Lost", format!("{} It is tried again by itself.", link::sentence(reason)), colors.warning)
+            ("Lost", format!("{} Reconnecting automatically.", link::sentence(reason)), colors.warning)
         }
         _ => return,
     };
@@ -293,17 +290,17 @@ fn empty_ui(context: &ViewContext<'_>, ui: &mut Ui) {
     ui.vertical_centered(|ui| {
         let link = context.link;
         if link.is_open() || link.is_opening() {
-            ui.heading(if link.is_open() { "Waiting for the first readings…" } else { "Connecting…" });
+            ui.heading(if link.is_open() { "Waiting for the first measurements…" } else { "Connecting…" });
         } else if context.source == Source::Simulated {
             ui.heading("No robot is connected");
-            hint_ui(ui, "Choose where its frames come from at the top: CAN, SLCAN, a recording, or the emulated robot.");
+            hint_ui(ui, "Choose a source at the top: CAN, SLCAN, a recording, or the emulated robot.");
             ui.add_space(8.0);
             if ui.button("Try the emulated robot").clicked() {
                 context.commands.send(Command::SelectSource(Source::Emulated));
             }
         } else {
             ui.heading("Not connected");
-            hint_ui(ui, "Fill in the form and connect. Motors, IMU, bus and raw frames appear here, the plots on the Tune tab.");
+            hint_ui(ui, "Fill in the form and connect. Motors, IMU, bus and raw frames are shown here, the plots on the Tune tab.");
         }
     });
 }

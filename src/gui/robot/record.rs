@@ -11,7 +11,7 @@ use crate::command::{Command, FilePurpose};
 use crate::context::ViewContext;
 use crate::widgets::{error_ui, hint_ui, section_ui, warning_ui};
 
-/// What has been typed.
+/// Typed text.
 #[derive(Default)]
 pub(crate) struct RecordForm {
     pub(super) path: String,
@@ -40,18 +40,18 @@ impl RecordForm {
         let field = TextEdit::singleline(&mut self.path).desired_width(f32::INFINITY);
         ui.add(field)
             .accessible_name("recording to write")
-            .on_hover_text("The robot log; the raw frames go to a file beside it with the ending .log");
+            .on_hover_text("Robot log (.csv); the raw frames go to a .log file of the same name");
         ui.horizontal(|ui| {
             let named = !self.path.trim().is_empty();
             let start = Button::new("Record").min_size(vec2(84.0, 0.0));
-            if ui.add_enabled(named, start).on_hover_text("Write rows and raw frames from now on").clicked() {
+            if ui.add_enabled(named, start).on_hover_text("Start recording rows and raw frames").clicked() {
                 let path = with_ending(PathBuf::from(self.path.trim()));
                 context.commands.send(Command::Order(SessionOrder::Record(Some(path))));
             }
             if ui.button("Choose…").on_hover_text("Choose folder and name").clicked() {
                 context.commands.send(Command::ShowDialog(FilePurpose::SaveRecording));
             }
-            if ui.button("New name").on_hover_text("A name with the time of now (UTC)").clicked() {
+            if ui.button("New name").on_hover_text("New name with the current time (UTC)").clicked() {
                 self.suggest();
             }
         });
@@ -77,7 +77,7 @@ fn status_ui(recording: &RecordingStatus, ui: &mut Ui) {
         row_ui(ui, "size", &format!("{:.2} MB", recording.bytes as f64 / 1e6), None);
     });
     if let Some(problem) = &recording.problem {
-        error_ui(ui, format!("The recording has ended: {problem}"));
+        error_ui(ui, format!("Recording stopped: {problem}"));
     }
 }
 

@@ -1,4 +1,4 @@
-//! What the page shows, as `--state-out` writes it.
+//! State of the page for `--state-out`.
 
 use flqr_core::control::drive::{CheckResult, Stage};
 use flqr_core::device::{Connection, DriveStatus, Status};

@@ -1,9 +1,11 @@
-//! Gains on their way from the design to the connected robot: on request, or as they change.
+//! Gains on their way from the design to the connected robot: manually, or as they change.
 
 use egui::{Button, Frame, Grid, Margin, RichText, Stroke, Ui};
-use flqr_core::control::BalanceController;
-use flqr_core::control::gate::{self, GainChange, Verdict};
-use flqr_core::model_file::RobotModel;
+use flqr_core::control::{
+    BalanceController,
+    gate::{self, GainChange, Verdict},
+};
+use flqr_core::model::RobotModel;
 use nalgebra::Matrix2x4;
 use serde_json::{Value, json};
 
@@ -17,7 +19,7 @@ use crate::widgets::{change, choice_ui, error_ui, hint_ui, mono, shown};
 /// The controller that the robot runs, and the one of the design.
 #[derive(Default)]
 pub(crate) struct Transfer {
-    /// Whether a driven robot gets new gains as they change, rather than on request.
+    /// True if a driven robot gets new gains as they change, rather than manually.
     pub(crate) follow: bool,
     running: Option<BalanceController>,
     /// Gains that the operator has agreed to last: live changes go no further from them than the gate asks for.
@@ -80,7 +82,7 @@ impl Transfer {
         self.pending.as_ref()
     }
 
-    /// The design that waits, to be sent on request of the operator; none if it is refused.
+    /// The design that waits, to be sent manually of the operator; none if it is refused.
     pub(super) fn take(&mut self) -> Option<BalanceController> {
         let Pending { design, .. } =
             self.pending.take_if(|pending| !matches!(pending.verdict, Verdict::Refuse(_)))?;
@@ -89,7 +91,7 @@ impl Transfer {
         Some(design)
     }
 
-    /// The same of a design that was refused or waited while the robot was driven, now that it is not.
+    /// Same for a design that was refused or waited while the robot was driven, now that it is not.
     pub(super) fn take_again(&mut self, robot: &RobotModel) -> Option<BalanceController> {
         let design = self.pending.as_ref()?.design.clone();
         self.set_design(robot, design, false)
@@ -112,7 +114,7 @@ impl Transfer {
 }
 
 impl Pending {
-    /// Why it must not reach the robot.
+    /// Reason why it must not be sent to the robot.
     pub(crate) fn refusal(&self) -> Option<String> {
         match &self.verdict {
             Verdict::Refuse(refusal) => Some(sentence(&refusal.to_string())),
@@ -121,7 +123,8 @@ impl Pending {
     }
 }
 
-/// Whether a robot would do the same under both: torque limit, yaw hold and odometry stay those of the connection.
+/// Returns whether a robot would do the same under both: torque limit, yaw hold and odometry stay those of the
+/// connection.
 fn is_same(a: &BalanceController, b: &BalanceController) -> bool {
     (a.gain, a.feedforward, &a.effects) == (b.gain, b.feedforward, &b.effects)
 }
@@ -132,8 +135,8 @@ pub(super) fn choice_of_transfer_ui(context: &ViewContext<'_>, ui: &mut Ui) {
         ui.label("new gains");
         let mut follow = context.link.transfer.follow;
         let choices = [
-            (false, "on request", "A driven robot gets new gains with “Apply to robot”"),
-            (true, "live", "A driven robot gets new gains as they change, up to a factor of 2"),
+            (false, "manually", "A robot being driven gets new gains with “Apply to robot”"),
+            (true, "live", "A robot being driven gets new gains immediately, up to a factor of 2"),
         ];
         if ui.scope(|ui| choice_ui(ui, &mut follow, &choices)).inner {
             context.commands.send(Command::FollowGains(follow));
@@ -152,13 +155,13 @@ pub(crate) fn pending_ui(context: &ViewContext<'_>, ui: &mut Ui) {
     frame.show(ui, |ui| {
         ui.set_width(ui.available_width());
         ui.horizontal(|ui| {
-            ui.label(RichText::new("The robot runs other gains").strong().color(color));
+            ui.label(RichText::new("The robot uses other gains").strong().color(color));
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                 apply_ui(context.link, context.commands, ui);
             });
         });
         if let Some(refusal) = &refusal {
-            error_ui(ui, format!("Not applied, the previous gains stay. {refusal}"));
+            error_ui(ui, format!("Not applied, the previous gains remain active. {refusal}"));
         }
         changes_ui(running, &pending.design, ui);
     });
@@ -170,7 +173,7 @@ pub(super) fn apply_ui(link: &Link, commands: &Commands, ui: &mut Ui) {
     let Some(pending) = link.transfer.pending() else { return };
     let refusal = pending.refusal();
     let button = ui.add_enabled(refusal.is_none(), Button::new(RichText::new("Apply to robot").strong()));
-    let button = button.on_hover_text("The gains fade in over 0.2 s");
+    let button = button.on_hover_text("The gains are blended over 0.2 s");
     if button.on_disabled_hover_text(refusal.unwrap_or_default()).clicked() {
         commands.send(Command::ApplyGains);
     }
@@ -186,7 +189,7 @@ fn changes_ui(running: &BalanceController, design: &BalanceController, ui: &mut 
         change_rows_ui(&changes, ui);
     });
     if (running.feedforward, &running.effects) != (design.feedforward, &design.effects) {
-        hint_ui(ui, "The friction feedforward changes too.");
+        hint_ui(ui, "The friction feedforward also changes.");
     }
 }
 

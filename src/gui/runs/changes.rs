@@ -1,4 +1,4 @@
-//! What changed from one row to another.
+//! Changes from one row to another.
 
 use std::collections::BTreeSet;
 
@@ -20,7 +20,7 @@ pub(super) struct Changes {
 
 impl Changes {
     pub(super) fn ui(&mut self, ledger: &Ledger, ticked: &BTreeSet<u64>, ui: &mut Ui) {
-        section_ui(ui, "What changed", |_| {});
+        section_ui(ui, "Changes", |_| {});
         let usual = usual(ledger, ticked);
         let mut numbers = usual;
         for (place, chosen) in self.chosen.iter_mut().enumerate() {
@@ -31,7 +31,7 @@ impl Changes {
             numbers[place] = chosen.or(usual[place]);
         }
         let [Some(old), Some(new)] = numbers.map(|number| ledger.row(number?)) else {
-            hint_ui(ui, "Two rows are needed.");
+            hint_ui(ui, "Select two rows.");
             return;
         };
         ScrollArea::both().id_salt("changes").auto_shrink(false).show(ui, |ui| differences_ui(old, new, ui));
@@ -75,7 +75,7 @@ fn differences_ui(old: &Run, new: &Run, ui: &mut Ui) {
     let found = differences(old, new);
     if found.is_empty() {
         let same = if old.sources == new.sources { "and the same sources" } else { "with other sources" };
-        hint_ui(ui, format!("Nothing: both were made with the same values, {same}."));
+        hint_ui(ui, format!("Nothing: both used the same values, {same}."));
     }
     Grid::new("changes").num_columns(4).striped(true).spacing([12.0, 3.0]).show(ui, |ui| {
         if !found.is_empty() {

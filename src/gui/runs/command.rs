@@ -1,4 +1,4 @@
-//! What the page asks for.
+//! Requests of the page.
 
 /// One wish about the ledger.
 #[derive(Clone, Debug, PartialEq)]

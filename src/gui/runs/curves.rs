@@ -25,7 +25,7 @@ impl Reading {
             series(&loaded.log)
         };
         let job = Job::start("read-curves", waker, read)
-            .map_err(|error| format!("No thread to read the recording: {error}."))?;
+            .map_err(|error| format!("Cannot start reading the recording: {error}."))?;
         Ok(Self { row: row.clone(), job })
     }
 
@@ -34,7 +34,7 @@ impl Reading {
         match self.job.poll().1 {
             Outcome::Running => None,
             Outcome::Done(result) => Some(result),
-            Outcome::Broken => Some(Err("Reading the curves failed: this is a defect of flqr".to_owned())),
+            Outcome::Broken => Some(Err("Reading the curves failed: this is an internal error".to_owned())),
         }
     }
 }

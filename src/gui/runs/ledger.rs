@@ -1,4 +1,5 @@
-//! All rows: their numbers, the curves that memory has room for, what is taken out and put back, and the session's file.
+//! All rows: their numbers, the curves that memory has room for, what is taken out and put back, and the session's
+//! file.
 
 use std::sync::Arc;
 
@@ -19,7 +20,7 @@ pub(crate) struct Ledger {
     /// The number given last.
     last: u64,
     rows: Vec<Arc<Run>>,
-    /// What was taken out, newest last; no file keeps it.
+    /// Deleted rows, newest last; not saved.
     deleted: Vec<Vec<Run>>,
     /// The number given last when this window showed it first: runs after it are this window's. No file keeps it.
     opened_at: Option<u64>,
@@ -43,7 +44,7 @@ impl Ledger {
         self.last
     }
 
-    /// Keeps the curves of `wanted`, however long, and those of the newest others that fit beside them.
+    /// Keeps the curves of `wanted`, however long, and those of the newest others that fit next to them.
     fn forget_old_series(&mut self, wanted: u64) {
         let size = |run: &Run| run.series.as_ref().map_or(0, |series| series.size());
         let mut kept = self.row(wanted).map_or(0, size);
@@ -77,7 +78,7 @@ impl Ledger {
         })
     }
 
-    /// What the session's file keeps.
+    /// Contents in the session file.
     pub(crate) fn to_value(&self) -> serde_json::Value {
         let rows: Vec<&Run> = self.rows.iter().map(|run| &**run).collect();
         serde_json::json!({ "last": self.last, "rows": rows })
@@ -94,26 +95,26 @@ impl Ledger {
         rows.sort_by_key(|row| row.number);
         rows.dedup_by_key(|row| row.number);
         let missing = kept.len() - rows.len();
-        let mut problem = (missing > 0).then(|| format!("“runs” has {missing} rows that cannot be read"));
+        let mut problem = (missing > 0).then(|| format!("“runs” has {missing} unreadable rows"));
         let last =
             value.get("last").and_then(serde_json::Value::as_u64).filter(|last| *last <= LARGEST_NUMBER);
         if rows.last().is_some_and(|row| row.number > LARGEST_NUMBER) {
             (1..).zip(&mut rows).for_each(|(number, row)| row.number = number);
-            problem = Some("“runs” has numbers without end: its rows are numbered anew".to_owned());
+            problem = Some("“runs” has invalid numbers: its rows were renumbered".to_owned());
         }
         let last = rows.last().map_or(0, |row| row.number).max(last.unwrap_or(0));
         let rows = rows.into_iter().map(Arc::new).collect();
         Ok((Self { last, rows, deleted: Vec::new(), opened_at: None }, problem))
     }
 
-    /// Whether a row is the same run as one of `other`, whatever has been noted on it since.
+    /// Returns whether a row is the same run as one of `other`, whatever has been noted on it since.
     pub(super) fn has(&self, row: &Run) -> bool {
         self.row(row.number).is_some_and(|here| {
             (here.unix_s, &here.sources, &here.title) == (row.unix_s, &row.sources, &row.title)
         })
     }
 
-    /// How many rows there are that `other` has not.
+    /// Number of rows that `other` does not have.
     pub(crate) fn missing_in(&self, other: &Self) -> usize {
         self.rows.iter().filter(|row| !other.has(row)).count()
     }
@@ -300,7 +301,7 @@ mod tests {
         value["rows"][1]["kind"] = "dance".into();
         value["last"] = "many".into();
         let (mut read, problem) = Ledger::from_value(&value).unwrap();
-        assert_eq!(problem.as_deref(), Some("“runs” has 1 rows that cannot be read"));
+        assert_eq!(problem.as_deref(), Some("“runs” has 1 unreadable rows"));
         assert_eq!(read.rows().iter().map(|run| run.number).collect::<Vec<_>>(), [1, 3]);
         assert_eq!(read.add(run(0, &presets::paper()), 8), 4);
         for no_ledger in [serde_json::json!([]), serde_json::json!({ "rows": 3 })] {

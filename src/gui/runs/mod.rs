@@ -16,7 +16,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use egui::{CentralPanel, Frame, Margin, Panel, Ui};
 use flqr_core::device::RecordingStatus;
-use flqr_core::model_file::Model;
+use flqr_core::model::Model;
 
 use crate::context::ViewContext;
 use crate::job::Waker;
@@ -101,7 +101,7 @@ impl RunsTab {
     /// Ticks the last two rows of one kind that have curves; a sentence where there are none.
     fn overlay_last(&mut self, waker: &Waker) -> Option<String> {
         let Some(numbers) = self.ledger.last_alike(Run::can_be_drawn) else {
-            return Some("There are no two runs of one kind with curves to draw over each other.".to_owned());
+            return Some("There are no two runs of one kind with curves to overlay.".to_owned());
         };
         self.ticked.clear();
         let mut problem = None;
@@ -120,7 +120,7 @@ impl RunsTab {
     /// # Errors
     /// A sentence says why nothing does.
     pub(crate) fn command_of(&self, number: u64) -> Result<String, String> {
-        self.ledger.row(number).ok_or("There is no such run.")?.command_line()
+        self.ledger.row(number).ok_or("This run does not exist.")?.command_line()
     }
 
     /// Changes the ledger; a sentence where there is something to say.
@@ -130,7 +130,7 @@ impl RunsTab {
             RunsCommand::Delete(numbers) => {
                 let deleted = self.ledger.delete(&numbers);
                 self.ticked.retain(|number| !numbers.contains(number));
-                let text = |deleted| format!("Deleted {}: Undo delete brings it back.", listed(deleted));
+                let text = |deleted| format!("Deleted {}. Undo delete restores it.", listed(deleted));
                 (!deleted.is_empty()).then(|| text(deleted))
             }
             RunsCommand::FocusRows => {
@@ -183,12 +183,12 @@ impl RunsTab {
         let run = match self.ticked.len() {
             0 => self.ledger.rows().last().map(|run| &**run),
             1 => self.ticked.first().and_then(|number| self.ledger.row(*number)),
-            _ => return Err("Several rows are ticked: tick the one whose command is wanted.".to_owned()),
+            _ => return Err("Several rows are selected. Select one to copy its command.".to_owned()),
         };
         run.ok_or("There is no run yet.")?.command_line()
     }
 
-    /// What the page shows, as `--state-out` writes it.
+    /// State of the page for `--state-out`.
     pub(crate) fn snapshot(&self) -> serde_json::Value {
         let rows: Vec<_> = self
             .ledger
@@ -220,7 +220,7 @@ impl RunsTab {
     pub(crate) fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
         let frame = Frame::central_panel(ui.style()).inner_margin(Margin::symmetric(10, 6));
         if self.ledger.rows().is_empty() && !self.ledger.has_deleted() {
-            let hint = "Every experiment, fit, refinement and recording becomes a row here, with a number that goes with all that is exported of it.";
+            let hint = "Every experiment, fit, refinement and recording is listed here, with a number that its exports carry.";
             CentralPanel::default()
                 .frame(frame)
                 .show(ui, |ui| empty_page_ui(ui, "No run yet.", hint, |_| {}));
@@ -237,8 +237,8 @@ impl RunsTab {
                 self.table.ui(context, &self.ledger, &mut self.ticked, undo, ui);
             });
         let panes = [
-            Pane::middle(Part::Overlay, "Runs over each other", 390.0).at_least(320.0),
-            Pane::right(Part::Changes, "What changed", 440.0, 240.0..=640.0),
+            Pane::middle(Part::Overlay, "Overlay of runs", 390.0).at_least(320.0),
+            Pane::right(Part::Changes, "Changes", 440.0, 240.0..=640.0),
         ];
         panes_ui(ui, "runs", &panes, |part, ui| match part {
             Part::Overlay => self.overlay.ui(&self.ledger, &self.ticked, context.commands, ui),

@@ -14,8 +14,8 @@ use crate::plot::{Data, Panel, PanelCurve, Stack, Unit, UnitChoice};
 use crate::theme::palette;
 use crate::widgets::{choice_ui, hint_ui, mono, number_ui, section_ui, shown, warning_ui};
 
-/// Why nothing of the ticked rows is drawn.
-const NO_SERIES: &str = "The ticked rows have no curves in memory.";
+/// Reason why the selected rows are not drawn.
+const NO_SERIES: &str = "The selected rows have no curves in memory.";
 /// A step in time this many times longer than the usual one is drawn as a gap.
 const GAP: f64 = 10.0;
 /// The plot is at least this high, with its axis.
@@ -23,16 +23,16 @@ const LEAST_HEIGHT: f32 = 130.0;
 /// Height of the table below the plot, of one row.
 const ROW_HEIGHT: f32 = 24.0;
 
-/// Number of a row and what to add to its times, s; none where it has no shape.
+/// Number of a row and what to add to its times, s; `None` if it has no shape.
 type Found = Vec<(u64, Option<f64>)>;
 
 /// Name of a channel and the core's unit of it.
 type Named = (&'static str, &'static str);
 
-/// How the rows are drawn.
+/// Style of the rows.
 pub(super) struct Overlay {
     stack: Stack,
-    /// What is drawn of the rows by their numbers, made anew only where it changes.
+    /// Drawn curves by row number, updated on changes only.
     curves: BTreeMap<u64, Curve>,
     /// Curves that were made.
     made: u64,
@@ -136,9 +136,9 @@ fn signal(series: &Series, channel: usize) -> Signal<'_> {
     Signal { time_s: &series.time_s, values: &series.channels[channel].values }
 }
 
-/// Why a row from before cannot be ticked.
-const NOT_KEPT: &str = "cannot be ticked: a session's file keeps what a run was made with and what came of it, not its \
-    curves. A right click on the row copies the command that makes it again; “What changed” compares its values.";
+/// Reason why a row of an earlier session cannot be selected.
+const NOT_KEPT: &str = "cannot be shown: a session file stores the settings and results of a run, not its \
+    curves. Right-click the row to copy the command that repeats it; “Changes” compares its values.";
 
 fn listed_rows(count: usize) -> String {
     format!("{count} experiment{}", if count == 1 { "" } else { "s" })
@@ -156,9 +156,9 @@ impl Overlay {
             self.channel = names.first().copied().unwrap_or_default();
         }
         let drawn = self.drawn(ledger, ticked, ui);
-        section_ui(ui, "Ticked runs", |ui| self.head_ui(&drawn, &names, ui));
+        section_ui(ui, "Selected runs", |ui| self.head_ui(&drawn, &names, ui));
         if drawn.is_empty() {
-            let text = if ticked.is_empty() { "Tick rows to see them over each other." } else { NO_SERIES };
+            let text = if ticked.is_empty() { "Select rows to overlay them." } else { NO_SERIES };
             hint_ui(ui, text);
             let is_lost = |run: &Run| run.kind == RunKind::Experiment && run.series.is_none();
             let lost = ledger.rows().iter().filter(|run| is_lost(run)).count();
@@ -190,25 +190,23 @@ impl Overlay {
     fn head_ui(&mut self, drawn: &[Drawn<'_>], names: &[Named], ui: &mut Ui) {
         let several = drawn.len() > 1 && self.job.is_none();
         let reset = ui.add_enabled(!self.shifts_s.is_empty(), Button::new("No shift"));
-        if reset.on_hover_text("Every run at its own times again").clicked() {
+        if reset.on_hover_text("Reset all time shifts").clicked() {
             self.shifts_s.clear();
         }
         let event = ui.add_enabled(several, Button::new("At an event"));
-        if event
-            .on_hover_text("Shift so that all first pass the level at the time at which the first row does")
-            .clicked()
+        if event.on_hover_text("Align the first crossing of this value with that of the first row").clicked()
         {
             self.align_at_event(drawn);
         }
         let (_, scale) = shown_unit(self.channel, ui);
         let mut level = scale * self.level;
-        number_ui(ui, &mut level, "event level", 46.0)
-            .on_hover_text(format!("Level of the event of {}", label(self.channel, ui)));
+        number_ui(ui, &mut level, "event threshold", 46.0)
+            .on_hover_text(format!("Threshold of {}", label(self.channel, ui)));
         if level != scale * self.level {
             self.level = level / scale;
         }
         let correlation = ui.add_enabled(several, Button::new("By shape"));
-        let help = "Shift so that each correlates most with the first row";
+        let help = "Align by maximum cross-correlation with the first row";
         if correlation.on_hover_text(help).clicked() {
             self.align_by_correlation(drawn, ui);
         }
@@ -220,14 +218,17 @@ impl Overlay {
                 ui.selectable_value(&mut self.channel, *name, label(*name, ui));
             }
         });
-        combo.response.accessible_name("curve to compare").on_hover_text("What is drawn of the ticked rows");
+        combo
+            .response
+            .accessible_name("curve to compare")
+            .on_hover_text("Signal shown for the selected rows");
     }
 
     fn align_at_event(&mut self, drawn: &[Drawn<'_>]) {
         let times: Found =
             drawn.iter().map(|row| (row.run.number, first_crossing_s(row.signal(), self.level))).collect();
         let Some((first, Some(time_s))) = times.first().copied() else {
-            self.problem = Some("The first row never passes this level: choose another one.".to_owned());
+            self.problem = Some("The first row never crosses this value. Choose another one.".to_owned());
             return;
         };
         let start_s = time_s + self.shifts_s.get(&first).copied().unwrap_or(0.0);
@@ -253,7 +254,7 @@ impl Overlay {
         };
         match Job::start("align-runs", &waker, work) {
             Ok(job) => self.job = Some(job),
-            Err(error) => self.problem = Some(format!("No thread to align the runs: {error}.")),
+            Err(error) => self.problem = Some(format!("Cannot start aligning the runs: {error}.")),
         }
     }
 
@@ -262,7 +263,7 @@ impl Overlay {
         match job.poll().1 {
             Outcome::Running => return,
             Outcome::Done(found) => self.take(found),
-            Outcome::Broken => self.problem = Some("Aligning failed: this is a defect of flqr.".to_owned()),
+            Outcome::Broken => self.problem = Some("Aligning failed: this is an internal error.".to_owned()),
         }
         self.job = None;
     }
@@ -280,7 +281,7 @@ impl Overlay {
         }
         if !without.is_empty() {
             let rows = without.join(", ");
-            self.problem = Some(format!("Run {rows} has nothing to align by and stays where it is."));
+            self.problem = Some(format!("Run {rows} cannot be aligned and is unchanged."));
         }
     }
 
@@ -346,12 +347,8 @@ impl Overlay {
             }
         });
         ui.horizontal(|ui| {
-            hint_ui(ui, "A drag in the plot moves");
-            let choices = [(
-                true,
-                "the view",
-                "Drag moves the visible time, the wheel zooms, a double click shows all",
-            )];
+            hint_ui(ui, "Dragging in the plot moves");
+            let choices = [(true, "the view", "Drag to pan, scroll to zoom, double-click to show all")];
             let mut view = self.dragged.is_none();
             if choice_ui(ui, &mut view, &choices) {
                 self.dragged = None;
@@ -369,13 +366,13 @@ impl Overlay {
         let moved = self.dragged == Some(number);
         let choice =
             ui.selectable_label(moved, "this run").accessible_name(format!("drag moves run {number}"));
-        if choice.on_hover_text("A drag in the plot shifts this run in time").clicked() {
+        if choice.on_hover_text("Dragging in the plot shifts this run in time").clicked() {
             self.dragged = (!moved).then_some(number);
         }
         let before = self.shifts_s.get(&number).copied().unwrap_or(0.0);
         let mut shift_s = before;
         number_ui(ui, &mut shift_s, &format!("shift of run {number}"), 64.0)
-            .on_hover_text("Added to the times of this run");
+            .on_hover_text("Time shift of this run");
         if shift_s != before {
             self.shifts_s.insert(number, shift_s);
         }
@@ -446,7 +443,7 @@ fn key(ui: &mut Ui, color: Color32) {
     ui.painter().hline(rect.x_range(), rect.center().y, Stroke::new(2.5, color));
 }
 
-/// What an export says of a row.
+/// Description of a row in exports.
 fn provenance(run: &Run, curves: &BTreeMap<u64, Curve>) -> String {
     let shift_s = curves.get(&run.number).map_or(0.0, |curve| curve.shift_s);
     let shifted = if shift_s == 0.0 { String::new() } else { format!(", shifted by {shift_s} s") };

@@ -4,12 +4,13 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
-use flqr_core::model_file::{Entry, Model};
+use flqr_core::model::Model;
+use flqr_core::model_file::Entry;
 use serde::{Deserialize, Serialize};
 
 use super::Sources;
 
-/// What was done.
+/// Kind of run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum RunKind {
@@ -50,7 +51,7 @@ pub(crate) struct Channel {
     pub(crate) values: Vec<f64>,
 }
 
-/// What a run looked like over time; not in files.
+/// Time series of a run; not saved.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Series {
     pub(crate) time_s: Vec<f64>,
@@ -58,7 +59,7 @@ pub(crate) struct Series {
 }
 
 impl Series {
-    /// How many values there are, times included.
+    /// Number of values, including times.
     pub(super) fn size(&self) -> usize {
         self.time_s.len() * (1 + self.channels.len())
     }
@@ -72,17 +73,17 @@ pub(crate) struct Run {
     /// When it ended, seconds since 1970 (UTC).
     pub(crate) unix_s: u64,
     pub(crate) kind: RunKind,
-    /// What it was, in a few words.
+    /// Short description.
     pub(crate) title: String,
     pub(crate) seed: Option<u64>,
     /// Of the model's text and of the logs' columns; the same sources have the same hash on any machine.
     pub(crate) sources: String,
     /// All values that it was made with: those of the model, of the settings.
     pub(crate) made_with: BTreeMap<String, Value>,
-    /// What makes it in a terminal.
+    /// Command line that repeats it.
     #[serde(default)]
     pub(crate) command: Option<String>,
-    /// What came of it, in one line.
+    /// Result in one line.
     pub(crate) result: String,
     /// The user's own words.
     pub(crate) note: String,
@@ -120,7 +121,7 @@ impl Run {
         }
     }
 
-    /// The same with a setting among what it was made with.
+    /// Adds a setting.
     pub(crate) fn with(mut self, key: &str, value: Value) -> Self {
         // A file has no numbers that are not finite.
         let value = match value {
@@ -148,14 +149,16 @@ impl Run {
         if q.is_empty() { String::new() } else { format!("{} | {}", q.join(" "), r.join(" ")) }
     }
 
-    /// What makes it again in a terminal.
+    /// Command line that repeats it.
     ///
     /// # Errors
     /// A sentence says why nothing does.
     pub(super) fn command_line(&self) -> Result<String, String> {
         self.command.clone().ok_or_else(|| match self.kind {
-            RunKind::Recording => format!("Run {} was recorded: no command makes it again.", self.number),
-            _ => format!("Run {} comes from a file that does not keep its command.", self.number),
+            RunKind::Recording => {
+                format!("Run {} is a recording and cannot be repeated by a command.", self.number)
+            }
+            _ => format!("The command of run {} is unknown.", self.number),
         })
     }
 
@@ -167,12 +170,12 @@ impl Run {
         }
     }
 
-    /// Whether its curves are in memory, or in a file.
+    /// Returns whether its curves are in memory, or in a file.
     pub(super) fn can_be_drawn(&self) -> bool {
         self.series.is_some() || self.file().is_some()
     }
 
-    /// What exports say of it, in one line.
+    /// One-line description in exports.
     pub(crate) fn provenance(&self) -> String {
         let seed = self.seed.map(|seed| format!(", seed {seed}")).unwrap_or_default();
         format!("run {}: {}{seed}, sources {}", self.number, self.title, self.sources)
@@ -187,7 +190,7 @@ pub(crate) struct Difference {
     pub(crate) new: Option<Value>,
 }
 
-/// What changed from `old` to `new`, in the order of the names.
+/// Changes from `old` to `new`, in the order of the names.
 pub(crate) fn differences(old: &Run, new: &Run) -> Vec<Difference> {
     let keys: std::collections::BTreeSet<_> = old.made_with.keys().chain(new.made_with.keys()).collect();
     let difference = |key: &String| {
@@ -214,7 +217,7 @@ pub(super) mod tests {
     fn what_changed_is_what_differs_in_the_files() {
         let mut model = presets::paper();
         let old = run(1, &model).with("setting.seconds", Value::Number(60.0));
-        if let flqr_core::model_file::Rig::Robot(robot) = &mut model.rig {
+        if let flqr_core::model::Rig::Robot(robot) = &mut model.rig {
             robot.parameters.wheel_mass_kg = 1.5;
             robot.limits.torque_nm = None;
         }

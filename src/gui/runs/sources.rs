@@ -1,6 +1,6 @@
-//! What a run was made of, as a hash.
+//! Hash of the inputs of a run.
 
-use flqr_core::model_file::Model;
+use flqr_core::model::Model;
 use flqr_core::record::Log;
 
 /// Hash of a model's text and of logs' columns. Long logs take their time: made on the thread that reads them.

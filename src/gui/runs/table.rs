@@ -27,7 +27,7 @@ const TITLE_WIDTH: f32 = 260.0;
 /// Least and greatest width of a result.
 const RESULT_WIDTH: [f32; 2] = [160.0, 620.0];
 
-/// What has been typed.
+/// Typed text.
 #[derive(Default)]
 pub(super) struct RunTable {
     filter: String,
@@ -54,7 +54,7 @@ impl RunTable {
         let found: Vec<&Run> =
             ledger.rows().iter().rev().map(|run| &**run).filter(|run| self.finds(run)).collect();
         if found.is_empty() {
-            hint_ui(ui, "No row has these words in it.");
+            hint_ui(ui, "No row matches.");
         }
         let others: f32 = self.widths.iter().map(|width| width + SPACING).sum::<f32>() - self.widths[RESULT];
         let result = (ui.available_width() - others).clamp(RESULT_WIDTH[0], RESULT_WIDTH[1]);
@@ -108,29 +108,23 @@ impl RunTable {
         can_undo: bool,
         ui: &mut Ui,
     ) {
-        if ui
-            .button("Copy rows")
-            .on_hover_text("All rows as a table for a spreadsheet, to the clipboard")
-            .clicked()
-        {
+        if ui.button("Copy rows").on_hover_text("Copy all rows as a table for a spreadsheet").clicked() {
             ui.ctx().copy_text(as_text(ledger));
         }
         let undo = ui.add_enabled(can_undo, Button::new("Undo delete"));
-        if undo.on_hover_text("Bring back the rows that were deleted last").clicked() {
+        if undo.on_hover_text("Restore the rows deleted last").clicked() {
             context.commands.send(Command::Runs(RunsCommand::UndoDelete));
         }
-        let delete = ui.add_enabled(!ticked.is_empty(), Button::new("Delete ticked"));
-        if delete.on_hover_text("Take the ticked rows out of the ledger").clicked() {
+        let delete = ui.add_enabled(!ticked.is_empty(), Button::new("Delete selected"));
+        if delete.on_hover_text("Delete the selected rows").clicked() {
             context.commands.send(Command::Runs(RunsCommand::Delete(ticked.iter().copied().collect())));
         }
-        let none = ui.add_enabled(!ticked.is_empty(), Button::new("Untick all"));
-        if none.on_hover_text("Draw none of the rows").clicked() {
+        let none = ui.add_enabled(!ticked.is_empty(), Button::new("Clear selection"));
+        if none.on_hover_text("Clear the selection").clicked() {
             context.commands.send(Command::Runs(RunsCommand::UntickAll));
         }
         let field = TextEdit::singleline(&mut self.filter).hint_text("filter").desired_width(140.0);
-        ui.add(field)
-            .accessible_name("filter of runs")
-            .on_hover_text("Rows that have all of these words in them");
+        ui.add(field).accessible_name("filter of runs").on_hover_text("Rows that contain all of these words");
     }
 
     fn finds(&self, run: &Run) -> bool {
@@ -159,7 +153,7 @@ impl RunTable {
         self.cell_ui(6, ui, |ui| ui.label(mono(run.weights()).small()));
         self.cell_ui(7, ui, |ui| {
             ui.label(mono(hash).small().weak())
-                .on_hover_text(format!("{}: hash of the model and of the logs' columns", run.sources))
+                .on_hover_text(format!("{}: hash of the model and of the log columns", run.sources))
         });
         self.cell_ui(RESULT, ui, |ui| {
             ui.set_max_width(result);
@@ -193,24 +187,22 @@ fn number_ui(context: &ViewContext<'_>, number: u64, ui: &mut Ui) {
     ui.label(mono(number.to_string()).strong());
     let delete = ui.add(Button::new("×").small().frame(false));
     let delete = delete.accessible_name(format!("delete run {number}"));
-    if delete.on_hover_text("Take this row out; Undo delete brings it back").clicked() {
+    if delete.on_hover_text("Delete this row; Undo delete restores it").clicked() {
         context.commands.send(Command::Runs(RunsCommand::Delete(vec![number])));
     }
 }
 
-/// Whether a row is drawn: offered only where that shows something.
+/// Returns whether a row is drawn: offered only where that shows something.
 fn tick_ui(context: &ViewContext<'_>, run: &Run, ticked: &mut BTreeSet<u64>, ui: &mut Ui) -> Response {
     let number = run.number;
     let mut tick = ticked.contains(&number);
     let drawn = run.series.is_some();
     let help = match (drawn, run.file().is_some(), run.kind) {
-        (true, ..) => "Draw it below, over the other ticked rows",
-        (_, true, _) => "Read its curves from its file and draw them below, over the other ticked rows",
-        (_, _, RunKind::Fit | RunKind::Refinement) => {
-            "It has no curves over time: its values are compared under “What changed”"
-        }
+        (true, ..) => "Overlay it below with the other selected rows",
+        (_, true, _) => "Read the curves from its file and overlay them below",
+        (_, _, RunKind::Fit | RunKind::Refinement) => "No time series. “Changes” compares its values",
         (_, _, RunKind::Experiment | RunKind::Recording) => {
-            "Its curves are not in memory any more: its values are compared under “What changed”; its command makes it again"
+            "Its curves are no longer in memory. “Changes” compares its values; its command repeats the run"
         }
     };
     outline_boxes(ui.visuals_mut());
@@ -228,7 +220,7 @@ fn tick_ui(context: &ViewContext<'_>, run: &Run, ticked: &mut BTreeSet<u64>, ui:
     }
     if !tick && !drawn && run.file().is_none() {
         let is_curveless = matches!(run.kind, RunKind::Fit | RunKind::Refinement);
-        let reason = if is_curveless { "no curves" } else { "curves not kept" };
+        let reason = if is_curveless { "no curves" } else { "curves not saved" };
         ui.label(RichText::new(reason).small().weak()).on_hover_text(help);
     }
     if tick && drawn {
@@ -239,7 +231,7 @@ fn tick_ui(context: &ViewContext<'_>, run: &Run, ticked: &mut BTreeSet<u64>, ui:
     check
 }
 
-/// What a row was; a right click offers its command.
+/// Description of a row; a right click copies its command.
 fn title_ui(context: &ViewContext<'_>, run: &Run, ui: &mut Ui) {
     ui.set_max_width(TITLE_WIDTH);
     let title =
@@ -250,7 +242,7 @@ fn title_ui(context: &ViewContext<'_>, run: &Run, ui: &mut Ui) {
     });
     title.context_menu(|ui| {
         let copy = ui.add_enabled(run.command.is_some(), Button::new("Copy as a command"));
-        if copy.on_hover_text("What makes this run again in a terminal").clicked() {
+        if copy.on_hover_text("Command line that repeats this run").clicked() {
             context.commands.send(Command::CopyLineOf(run.number));
             ui.close();
         }

@@ -1,7 +1,7 @@
 //! Recordings of a robot, each a row once it has ended.
 
 use flqr_core::device::RecordingStatus;
-use flqr_core::model_file::Model;
+use flqr_core::model::Model;
 
 use super::Sources;
 use super::run::{Run, RunKind, Value};
@@ -60,7 +60,7 @@ impl Recording {
         let name = status.file.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let mut result = format!("{} rows, {} frames", status.rows, status.frames);
         if *was_changed {
-            result += ", the model was changed meanwhile";
+            result += ", the model was changed during the run";
         }
         if let Some(problem) = &status.problem {
             result += &format!(", ended early: {problem}");
@@ -113,7 +113,7 @@ mod tests {
     fn a_recording_was_made_with_the_model_of_its_start() {
         let heavy = |mass_kg: f64| {
             let mut model = presets::paper();
-            if let flqr_core::model_file::Rig::Robot(robot) = &mut model.rig {
+            if let flqr_core::model::Rig::Robot(robot) = &mut model.rig {
                 robot.parameters.body_mass_kg = mass_kg;
             }
             model

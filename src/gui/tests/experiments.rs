@@ -10,7 +10,8 @@ use common::{ROBOT, SIZE, TempFile, Window, click, enter, open, options, random_
 use egui::accesskit::Role;
 use egui::{Event, Key, Modifiers, Pos2, Vec2, vec2};
 use egui_kittest::kittest::Queryable;
-use flqr_core::model_file::{Model, presets};
+use flqr_core::model::Model;
+use flqr_core::model_file::presets;
 use flqr_core::record::{ColumnMap, ReadOptions, read_log};
 use flqr_core::simulate::{ControllerChoice, Experiment, Outcome, Run, Scenario, Statistics, run};
 use flqr_gui::{Tab, WindowOptions};
@@ -266,7 +267,7 @@ fn runs_are_saved_as_logs_plots_and_report() {
     // A name with a point keeps both logs apart, and the question names what is there.
     std::fs::write(path("run.txt-flqr.csv"), "precious").unwrap();
     let refused = save(&mut window, "Logs", &path("run.txt"));
-    assert_eq!(refused, format!("{} exists and was not replaced.", path("run.txt-flqr.csv")));
+    assert_eq!(refused, format!("{} exists and was not overwritten.", path("run.txt-flqr.csv")));
     assert!(!folder.join("run.txt-lqr.csv").exists());
     window.step();
     window.get_by_label(&format!("Replace {}?", path("run.txt-flqr.csv")));
@@ -288,7 +289,7 @@ fn runs_are_saved_as_logs_plots_and_report() {
     }
 
     std::fs::write(path("report.html"), "precious").unwrap();
-    assert!(save(&mut window, "Report", &path("report.html")).contains("was not replaced"));
+    assert!(save(&mut window, "Report", &path("report.html")).contains("was not overwritten"));
     assert_eq!(std::fs::read_to_string(path("report.html")).unwrap(), "precious");
     window.step();
     click(&mut window, "Replace");
@@ -379,7 +380,7 @@ fn the_command_names_the_file_only_while_it_holds_the_model() {
     window.key_press_modifiers(Modifiers::COMMAND, Key::Num4);
     window.run_steps(2);
     assert_eq!(state(&window)["tab"], "experiments");
-    window.get_by_label_contains("The model was changed after these runs");
+    window.get_by_label_contains("The model has changed since these runs");
     click(&mut window, "Run LQR and FLQR");
     until(&mut window, "other runs", |s| command(s).starts_with("flqr simulate MODEL.toml"));
 }

@@ -8,7 +8,7 @@ use common::{SIZE, Window, click, open, options, state};
 use egui::accesskit::Role;
 use egui::{Event, Key, Modifiers, vec2};
 use egui_kittest::kittest::{NodeT, Queryable};
-use flqr_core::model_file::Model;
+use flqr_core::model::Model;
 use flqr_gui::{Tab, WindowOptions};
 use serde_json::Value;
 

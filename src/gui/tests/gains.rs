@@ -10,9 +10,12 @@ use common::script::{GOOD, Script, arm, at_stage, drive_window, tell};
 use common::{SIZE, TempFile, Window, click, closes, enter, open, options, state, until};
 use egui::{Event, Key, Modifiers};
 use egui_kittest::kittest::Queryable;
-use flqr_core::control::drive::{DriveOrder, Stage, StopReason};
-use flqr_core::control::{BalanceController, gate};
-use flqr_core::model_file::{Model, RobotModel};
+use flqr_core::control::{
+    BalanceController,
+    drive::{DriveOrder, Stage, StopReason},
+    gate,
+};
+use flqr_core::model::{Model, RobotModel};
 use flqr_gui::{Tab, WindowOptions};
 use serde_json::Value;
 
@@ -48,7 +51,7 @@ fn a_driven_robot_gets_new_gains_on_request() {
     enter(&mut window, "pitch weight", "150");
     assert_eq!(controllers(&script), [], "nothing is sent by itself");
     assert_eq!(gains(&window)["pending"], "accept");
-    window.get_by_label("The robot runs other gains");
+    window.get_by_label("The robot uses other gains");
     click(&mut window, "Apply to robot");
     let sent = controllers(&script);
     let [controller] = &sent[..] else { panic!("{sent:?}") };
@@ -59,7 +62,7 @@ fn a_driven_robot_gets_new_gains_on_request() {
     // Without friction feedforward: the same way.
     click(&mut window, "LQR");
     assert_eq!(controllers(&script), []);
-    window.get_by_label("The friction feedforward changes too.");
+    window.get_by_label("The friction feedforward also changes.");
     click(&mut window, "Apply to robot");
     assert_eq!(controllers(&script)[0].feedforward, [None; 2]);
 }
@@ -80,7 +83,7 @@ fn a_large_change_is_asked_about_and_an_unstable_one_refused() {
 
     enter(&mut window, "pitch weight", "1e30");
     assert_eq!(gains(&window)["pending"], "refuse");
-    window.get_by_label_contains("Not applied, the previous gains stay. The loop is unstable");
+    window.get_by_label_contains("Not applied, the previous gains remain active. The loop is unstable");
     click(&mut window, "Apply to robot");
     assert_eq!(controllers(&script), []);
 }
@@ -121,12 +124,12 @@ fn a_robot_that_is_not_driven_has_the_gains_of_the_design_unless_they_are_refuse
     tell(&mut window, &script, at_stage(1.0, Stage::Driving, GOOD));
     enter(&mut window, "pitch weight", "130");
     assert_eq!(controllers(&script), []);
-    tell(&mut window, &script, at_stage(2.0, Stage::Stopped(StopReason::Asked), &[]));
+    tell(&mut window, &script, at_stage(2.0, Stage::Stopped(StopReason::Requested), &[]));
     assert_eq!(controllers(&script).len(), 1);
     assert_eq!(gains(&window)["pending"], Value::Null);
 }
 
-/// Whatever is typed, on request or live, only gains that the gate lets through are sent.
+/// Whatever is typed, manually or live, only gains that the gate lets through are sent.
 #[test]
 fn no_bad_edit_reaches_a_driven_robot() {
     let edits = [
@@ -222,7 +225,7 @@ fn disconnecting_sends_a_stop_only_to_a_robot_that_is_driven() {
         (Stage::Listening, &[][..]),
         (Stage::Checking, &[]),
         (Stage::Driving, &[DriveOrder::Stop]),
-        (Stage::Stopped(StopReason::Asked), &[]),
+        (Stage::Stopped(StopReason::Requested), &[]),
     ] {
         let script = Script::default();
         let mut window = drive_window(&script);
@@ -241,12 +244,12 @@ fn another_model_is_not_taken_while_the_robot_is_driven() {
     let file = TempFile::new("other.toml", &common::ROBOT.replace("Test robot", "Other"));
     enter(&mut window, "model path", file.name());
     let refused = until(&mut window, "refusal", |s| {
-        s["message"].as_str().is_some_and(|message| message.contains("stop it before loading another model"))
+        s["message"].as_str().is_some_and(|message| message.contains("Stop it before you load another model"))
     });
     assert_eq!((&refused["model"], &refused["robot_tab"]["session"]), (&"Test robot".into(), &"open".into()));
     click(&mut window, "simulated");
     let refused = state(&window);
-    assert!(refused["message"].as_str().unwrap().contains("stop it before choosing another source"));
+    assert!(refused["message"].as_str().unwrap().contains("Stop it before you change the source"));
     assert_eq!(refused["source"], "emulated");
     assert!(script.drive_orders().is_empty());
 }
@@ -268,7 +271,7 @@ fn limits_that_are_switched_off_are_shown_by_the_arm_button_and_unit_slips_by_th
     click(&mut window, "May drive");
     click(&mut window, "Connect");
     until(&mut window, "connecting", |s| s["robot_tab"]["session"] == "open");
-    window.get_by_label_contains("Tilt_rad = 3 in [safety] switches this check off");
+    window.get_by_label_contains("Tilt_rad = 3 in [safety] disables this check");
     click(&mut window, "Tune");
     window.get_by_label_contains("robot.wheel_radius_m: 100 looks like millimetres");
 }

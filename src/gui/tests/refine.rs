@@ -9,9 +9,8 @@ use std::ops::ControlFlow;
 use common::{SIZE, TempFile, Window, click, command, enter, open, options, random_input, state, until};
 use egui::{Key, Modifiers, Vec2, vec2};
 use egui_kittest::kittest::Queryable;
-use flqr_core::model_file::Model;
+use flqr_core::model::{Model, Motor};
 use flqr_core::record::write_log;
-use flqr_core::robot::Motor;
 use flqr_core::simulate::{ControllerChoice, Experiment, Scenario, run};
 use flqr_gui::{Tab, WindowOptions};
 use serde_json::Value;
@@ -55,7 +54,7 @@ fn add(window: &mut Window, log: &TempFile) {
 }
 
 fn search(window: &mut Window) -> Value {
-    click(window, "Find what is missing");
+    click(window, "Find missing effects");
     until(window, "the search", |s| s["refine_tab"]["running"].is_null())
 }
 
@@ -83,7 +82,7 @@ fn what_a_log_shows_is_found_and_goes_into_the_model() {
     // The model of this page is that of the session: saved here, it is in a file.
     let model = TempFile::new("used.toml", "");
     std::fs::remove_file(&model.0).unwrap();
-    enter(&mut window, "path to save what was found to", model.name());
+    enter(&mut window, "path to save the results to", model.name());
     let saved = until(&mut window, "saving", |s| s["unsaved_changes"] == false);
     assert!(saved["message"].as_str().unwrap().contains(model.name()), "{saved:#}");
     assert!(std::fs::read_to_string(&model.0).unwrap().contains("cogging"));
@@ -139,7 +138,7 @@ fn an_effect_that_is_not_ticked_stays_out_of_what_is_saved_and_used() {
     let model = TempFile::new("ticked.toml", "");
     std::fs::remove_file(&model.0).unwrap();
     let save = |window: &mut Window, said: &str| {
-        enter(window, "path to save what was found to", model.name());
+        enter(window, "path to save the results to", model.name());
         until(window, said, |s| s["message"].as_str().is_some_and(|m| m.contains(said)));
         std::fs::read_to_string(&model.0).unwrap()
     };
@@ -147,7 +146,7 @@ fn an_effect_that_is_not_ticked_stays_out_of_what_is_saved_and_used() {
 
     // What is there is replaced only after a question.
     click(&mut window, "add cogging");
-    assert!(save(&mut window, "was not replaced").contains("cogging"));
+    assert!(save(&mut window, "was not overwritten").contains("cogging"));
     click(&mut window, "Replace");
     until(&mut window, "saving", |s| s["message"].as_str().is_some_and(|m| m.starts_with("Saved")));
     let text = std::fs::read_to_string(&model.0).unwrap();
@@ -165,12 +164,12 @@ fn what_is_stale_says_so_in_the_page_and_in_the_file() {
     search(&mut window);
     enter(&mut window, "seed of the search", "7");
     assert_eq!(state(&window)["refine_tab"]["standing"], "stale");
-    window.get_by_label_contains("Stale. This was made with other settings");
-    enter(&mut window, "path to save what was found to", report.name());
+    window.get_by_label_contains("Out of date. This result was computed with other settings");
+    enter(&mut window, "path to save the results to", report.name());
     let saved = until(&mut window, "saving", |s| s["message"].as_str().is_some_and(|m| m.contains(".html")));
-    assert!(saved["message"].as_str().unwrap().contains("Stale when it was saved"), "{saved:#}");
+    assert!(saved["message"].as_str().unwrap().contains("Out of date when saved"), "{saved:#}");
     let html = std::fs::read_to_string(&report.0).unwrap();
-    assert!(html.contains("Stale when it was saved") && html.contains("<svg"));
+    assert!(html.contains("Out of date when saved") && html.contains("<svg"));
     enter(&mut window, "seed of the search", "1");
     assert_eq!(state(&window)["refine_tab"]["standing"], "fresh");
 }
@@ -196,7 +195,7 @@ fn a_log_that_cannot_answer_gives_reasons_and_no_effect() {
     assert_eq!(tab["step"], "health");
     assert!(window.query_all_by_label("error").next().is_some());
     show(&mut window, "add");
-    assert!(window.query_all_by_label_contains("Data unfit").next().is_some());
+    assert!(window.query_all_by_label_contains("Log not suitable for identification").next().is_some());
     assert!(window.query_by_label("Use in the model").is_none());
 }
 
@@ -206,20 +205,20 @@ fn every_step_shows_what_there_is() {
     let mut window = page();
     for step in ["residual", "candidates", "add", "compare"] {
         show(&mut window, step);
-        window.get_by_label("Nothing was searched yet.");
+        window.get_by_label("No search yet.");
     }
     add(&mut window, &log);
-    click(&mut window, "How far is the model?");
+    click(&mut window, "Compute residual");
     let answered = until(&mut window, "the residual", |s| s["refine_tab"]["residual"].is_object());
     assert_eq!(answered["refine_tab"]["step"], "residual");
-    window.get_by_label("How far the model is");
+    window.get_by_label("Residual");
     search(&mut window);
     for (step, text) in [
-        ("residual", "means from peak to peak"),
+        ("residual", "peak-to-peak of the means"),
         ("residual", "strongest: order"),
-        ("candidates", "What was tried"),
+        ("candidates", "Candidates"),
         ("add", "add cogging"),
-        ("compare", "On rows that took no part in the estimates"),
+        ("compare", "On held-out rows"),
     ] {
         show(&mut window, step);
         assert!(window.query_all_by_label_contains(text).next().is_some(), "{step}: {text}");

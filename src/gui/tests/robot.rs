@@ -20,8 +20,8 @@ use flqr_core::device::{
     Update,
 };
 use flqr_core::link::{Direction, Frame, FrameId, StampedFrame};
+use flqr_core::model::Motor;
 use flqr_core::record::Sample;
-use flqr_core::robot::Motor;
 use flqr_gui::{Tab, WindowOptions};
 use serde_json::Value;
 
@@ -127,7 +127,7 @@ fn a_form_that_misses_something_says_so_and_does_not_connect() {
     window.get_by_label_contains("The adapter's port is empty");
     enter(&mut window, "port of the adapter", "/dev/ttyACM0");
     enter(&mut window, "bit rate of the CAN bus", "fast");
-    window.get_by_label_contains("The bit rate is no whole number above 0");
+    window.get_by_label_contains("The bit rate must be a whole number above 0");
     window.key_press_modifiers(Modifiers::COMMAND, Key::Enter);
     window.run_steps(3);
     assert_eq!(script.with(|shared| shared.opened.len()), 0);
@@ -183,7 +183,7 @@ fn stop_is_in_reach_on_every_tab_and_its_reason_is_shown() {
     let now = state(&window);
     assert_eq!(now["robot_tab"]["stage"], "stopped");
     assert_eq!(now["robot_tab"]["stop_reason"], "motor_silent");
-    assert!(window.get_all_by_label_contains("look at its cable").count() >= 2, "strip and page");
+    assert!(window.get_all_by_label_contains("check its cable").count() >= 2, "strip and page");
     click(&mut window, "Release the stop");
     assert_eq!(script.drive_orders(), [DriveOrder::Release]);
 }
@@ -256,9 +256,9 @@ fn space_does_not_press_the_focused_button_while_it_stops() {
     assert_eq!(script.drive_orders(), [DriveOrder::Stop]);
     assert_eq!(state(&window)["robot_tab"]["session"], "open");
     // Stopped, the key belongs to the button again.
-    tell(&mut window, &script, at_stage(2.0, Stage::Stopped(StopReason::Asked), &[]));
+    tell(&mut window, &script, at_stage(2.0, Stage::Stopped(StopReason::Requested), &[]));
     std::thread::sleep(Duration::from_millis(350));
-    tell(&mut window, &script, at_stage(2.1, Stage::Stopped(StopReason::Asked), &[]));
+    tell(&mut window, &script, at_stage(2.1, Stage::Stopped(StopReason::Requested), &[]));
     window.key_press(Key::Space);
     window.run_steps(3);
     until(&mut window, "closing", |s| s["robot_tab"]["session"] == "closed");
@@ -300,7 +300,7 @@ fn a_session_that_ends_by_itself_is_said() {
     arm(&mut window, &script);
     script.with(|shared| shared.died = true);
     let ended = until(&mut window, "the end", |s| s["robot_tab"]["session"] == "closed");
-    assert!(ended["message"].as_str().unwrap().contains("Switch the robot off by hand"), "{ended:#}");
+    assert!(ended["message"].as_str().unwrap().contains("Switch the robot off manually"), "{ended:#}");
     assert_eq!(ended["robot_tab"]["stage"], "disconnected");
 }
 
@@ -373,7 +373,7 @@ fn a_silent_and_a_lost_bus_are_said_with_the_hint() {
     let mut window = script_window(Tab::Robot, &script, "slcan:/dev/ttyACM0@1000000");
     for (connection, name, text) in [
         (Connection::Silent { hint: "is the bit rate right".to_owned() }, "silent", "is the bit rate right"),
-        (Connection::Lost { reason: "unplugged".to_owned() }, "lost", "tried again by itself"),
+        (Connection::Lost { reason: "unplugged".to_owned() }, "lost", "Reconnecting automatically"),
     ] {
         let mut told = update(1.0);
         told.status.connection = connection;
@@ -400,7 +400,7 @@ fn frames_are_filtered_by_id_bytes_and_direction_and_held() {
     click(&mut window, "tx");
     assert_eq!(shown(&window), 15);
     enter(&mut window, "identifiers to show", "left wheel");
-    window.get_by_label_contains("is no identifier");
+    window.get_by_label_contains("is not an identifier");
     enter(&mut window, "identifiers to show", " ");
     click(&mut window, "Hold");
     let before = shown(&window);
@@ -439,7 +439,7 @@ fn a_recording_is_started_shown_and_ended() {
     let problem = Some("the disk is full: make room".to_owned());
     told.status.recording = Some(RecordingStatus { problem, ..recording });
     tell(&mut window, &script, told);
-    window.get_by_label("The recording has ended: the disk is full: make room");
+    window.get_by_label("Recording stopped: the disk is full: make room");
     window.get_by_label("Record");
 }
 
@@ -477,8 +477,8 @@ fn a_recording_is_replayed_to_its_end() {
     let ended = until(&mut window, "the end", |s| s["robot_tab"]["connection"] == "ended");
     assert_eq!((&ended["robot_tab"]["rows"], &ended["robot_tab"]["skipped_rows"]), (&300.into(), &0.into()));
     assert!((ended["robot_tab"]["end_s"].as_f64().unwrap() - 0.299).abs() < 1e-9, "{ended:#}");
-    assert_eq!(ended["robot_tab"]["last_event"], "the recording has come to its end: 300 rows and 0 frames");
-    window.get_by_label("the recording has come to its end");
+    assert_eq!(ended["robot_tab"]["last_event"], "end of the recording: 300 rows and 0 frames");
+    window.get_by_label("end of the recording");
     // Once more from the form.
     click(&mut window, "Close");
     until(&mut window, "closing", |s| s["robot_tab"]["session"] == "closed");
@@ -498,12 +498,12 @@ fn another_robot_is_described_by_a_dbc_file() {
     // The header opens over some frames.
     window.run_steps(20);
     enter(&mut window, "DBC file", "/data/other.dbc");
-    window.get_by_label_contains("No signal of the DBC file is chosen");
+    window.get_by_label_contains("No signal of the DBC file is selected");
     enter(&mut window, "signals of the DBC file", "lean=Lean");
-    window.get_by_label_contains("There is no quantity `lean`");
+    window.get_by_label_contains("nknown column `lean`");
     enter(&mut window, "signals of the DBC file", "pitch=Body.Lean\nmotor_speed_left=Left*-1, torque_left=T");
     click(&mut window, "May drive");
-    window.get_by_label_contains("can be watched only");
+    window.get_by_label_contains("can only be monitored");
     click(&mut window, "Listen only");
     click(&mut window, "Connect");
     until(&mut window, "connecting", |s| s["robot_tab"]["session"] == "open");

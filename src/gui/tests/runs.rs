@@ -93,7 +93,7 @@ fn the_last_two_runs_of_one_kind_are_drawn_by_a_command_and_any_row_by_the_keybo
     command(&mut window, "overlay the last two runs");
     assert_eq!(state(&window)["tab"], "runs");
     assert_eq!(state(&window)["runs_tab"]["shown"], serde_json::json!([3, 4]));
-    command(&mut window, "untick all runs");
+    command(&mut window, "deselect all runs");
     assert_eq!(state(&window)["runs_tab"]["shown"], serde_json::json!([]));
 
     // The newest row is the first; the arrows go from box to box.

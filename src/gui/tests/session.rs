@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use common::{ROBOT, SIZE, TempFile, Window, click, closes, command, enter, open, options, state, until};
 use egui::{Event, Key, Modifiers, vec2};
 use egui_kittest::kittest::Queryable;
-use flqr_core::model_file::Model;
+use flqr_core::model::Model;
 use flqr_gui::{Tab, WindowOptions};
 use serde_json::{Value, json};
 
@@ -165,7 +165,7 @@ fn starting_afresh_leaves_the_kept_session_in_its_file() {
     let mut window = open(folder.options(), SIZE);
     until(&mut window, "the question", |s| s["question"] == "restore");
     window.run_steps(2);
-    click(&mut window, "Start afresh");
+    click(&mut window, "Start new");
     assert_eq!(pitch_weight(&window), 100.0);
     let message = state(&window)["message"].as_str().unwrap().to_owned();
     let kept = folder.0.join("left-0.flqr-session");
@@ -365,10 +365,10 @@ fn a_broken_session_file_never_stops_the_start() {
     let not_a_number = whole.replacen("\"zoom\": 1.0", "\"zoom\": NaN", 1);
     assert!(newer != whole && not_a_number != whole);
     for (number, (text, said, asks)) in [
-        (&whole[..whole.len() / 2], "ends early", true),
-        (&newer, "newer flqr (version 9", true),
+        (&whole[..whole.len() / 2], "is truncated", true),
+        (&newer, "newer version of flqr (format 9", true),
         (&not_a_number, "“zoom” cannot be read", true),
-        ("{\"format", "no session file", false),
+        ("{\"format", "not a session file", false),
     ]
     .into_iter()
     .enumerate()
@@ -428,11 +428,11 @@ fn what_a_session_has_lost_stays_in_view_until_the_user_does_something() {
         assert!(now["question"].is_null(), "{now:#}");
         assert_eq!(now["message_severity"], "warning");
         let said = now["message"].as_str().unwrap();
-        for part in ["“theme” cannot be read", "ends early, without “zoom”, “angles”, “runs”"]
+        for part in ["“theme” cannot be read", "is truncated, without “zoom”, “angles”, “runs”"]
         {
             assert!(said.contains(part), "{part}: {said}");
         }
-        window.get_by_label_contains("Not all of the session was read");
+        window.get_by_label_contains("The session was read in part");
         keys(&mut window, Modifiers::NONE, Key::F1);
         assert_ne!(state(&window)["message"], said);
         assert_eq!(state(&window)["message_severity"], "note");
@@ -441,7 +441,7 @@ fn what_a_session_has_lost_stays_in_view_until_the_user_does_something() {
     open_session(&mut window, &garbage);
     let named = garbage.to_str().unwrap();
     let found = until(&mut window, "the refusal", |s| s["message"].as_str().unwrap().contains(named));
-    assert_eq!(found["message"], format!("{named} is no session file of flqr; it is kept as it is."));
+    assert_eq!(found["message"], format!("{named} is not a session file of flqr. It is left unchanged."));
 }
 
 #[test]

@@ -54,7 +54,7 @@ fn a_command_that_cannot_be_given_says_why() {
     window.run_steps(2);
     window.key_press_modifiers(Modifiers::COMMAND, Key::Enter);
     window.run_steps(3);
-    assert_eq!(message(&window), "Start or cancel: this page starts nothing.");
+    assert_eq!(message(&window), "Start or cancel: nothing to start on this page.");
 }
 
 #[test]
@@ -83,7 +83,7 @@ fn pages_are_shown_beside_each_other_and_put_back() {
     command(&mut window, "reset the layout");
     assert_eq!(state(&window)["shown"], json!(["robot"]));
     command(&mut window, "reset the layout");
-    window.get_by_label("Reset the layout: it is as at the first start");
+    window.get_by_label("Reset the layout: already the default layout");
 }
 
 #[test]
@@ -97,7 +97,7 @@ fn messages_are_kept_filtered_and_copied() {
     window.get_by_label("2 of 2 messages");
     window.get_by_label("message filter").click();
     window.step();
-    window.event(Event::Text("starts".to_owned()));
+    window.event(Event::Text("loaded".to_owned()));
     window.run_steps(3);
     window.get_by_label("1 of 2 messages");
     click(&mut window, "Copy messages");
@@ -115,7 +115,7 @@ fn of_a_long_list_of_messages_what_is_in_view_is_drawn_with_the_newest() {
     }
     window.run_steps(3);
     window.get_by_label("121 of 121 messages");
-    let drawn = window.get_all_by_label_contains("starts nothing").count();
+    let drawn = window.get_all_by_label_contains("nothing to start").count();
     assert!((8..40).contains(&drawn), "{drawn} of 60");
     let newest = window.get_all_by_label("Undo: there is nothing to undo.").map(|node| node.rect().bottom());
     let lowest = newest.fold(0.0, f32::max);
@@ -153,7 +153,7 @@ fn the_menus_and_the_list_of_keys_are_made_of_the_commands() {
     click(&mut window, "Friction to the right");
     assert_eq!(state(&window)["shown"], json!(["tune", "friction"]));
     click(&mut window, "Keys");
-    window.get_by_label("STOP a robot that is checked or driven: no torque, motors off");
+    window.get_by_label("STOP the robot: no torque, motors off");
 }
 
 #[test]
@@ -190,7 +190,7 @@ fn what_runs_and_what_it_needs_stay_in_view_beside_another_design() {
         ["design A", "design B", "LQR", "FLQR", "compensation ratio"].into_iter().for_each(seen);
         if size == SIZE {
             ["step size", "show step"].into_iter().for_each(seen);
-            window.get_by_label_contains("Gets up from a lean");
+            window.get_by_label_contains("Recovers from an initial tilt");
         }
     }
 }
@@ -204,7 +204,7 @@ fn a_low_window_shows_the_robot_and_the_prediction_one_at_a_time() {
         click(&mut window, "Prediction");
         window.get_by_label("Predicted");
         let bottom = window.get_by_label_contains("simulated: paused").rect().top();
-        let plane = window.get_by_label("plane of poles").rect();
+        let plane = window.get_by_label("pole map").rect();
         assert!(plane.bottom() <= bottom && plane.height() > 80.0, "{plane:?} of {size}");
         assert!(plane.right() <= size.x && plane.width() > 60.0, "{plane:?} of {size}");
     }
@@ -258,7 +258,7 @@ fn the_actions_of_a_page_are_commands() {
     window.get_by_label("figure path");
     command(&mut window, "refine");
     assert_eq!(state(&window)["tab"], "refine");
-    command(&mut window, "how far is the model");
+    command(&mut window, "compute residual");
     let said = state(&window)["message"].as_str().unwrap().to_owned();
     assert!(said.contains("Needs a log"), "{said}");
 }
@@ -278,6 +278,11 @@ fn the_status_says_what_is_wrong_with_a_log() {
     let bad = health.iter().filter(|finding| finding["severity"] != "info").count();
     assert!(bad > 0, "{found:#}");
     let said = found["message"].as_str().unwrap();
-    let count = format!("400 rows loaded with {bad} health finding");
-    assert!(said.starts_with(&count) && said.contains("“Data health” on the Friction page"), "{said}");
+    let count = format!("with {bad} data-health finding");
+    assert!(
+        said.starts_with("400 rows loaded from ")
+            && said.contains(&count)
+            && said.contains("“Data health” on the Friction page"),
+        "{said}"
+    );
 }

@@ -10,7 +10,8 @@ use common::{ROBOT, SIZE, TempFile, Window, click, enter, open, options, random_
 use egui::accesskit::Role;
 use egui::{Event, Key, Modifiers, Pos2, Vec2, vec2};
 use egui_kittest::kittest::Queryable;
-use flqr_core::model_file::{AxisParameters, Model, Rig, presets};
+use flqr_core::model::{AxisParameters, Model, Rig};
+use flqr_core::model_file::presets;
 use flqr_gui::{Tab, WindowOptions};
 use serde_json::Value;
 
@@ -53,7 +54,7 @@ fn a_drag_of_a_slider_changes_the_gains_while_it_lasts() {
     assert_ne!(state(&window)["gain"], before["gain"], "while the button is still down");
     window.drop_at(to);
     window.run_steps(2);
-    click(&mut window, "Back to A");
+    click(&mut window, "Revert to A");
     assert_eq!(state(&window)["gain"], before["gain"], "A is the design of the loaded model");
 }
 
@@ -139,7 +140,7 @@ fn a_and_b_change_places_and_differences_are_listed() {
     click(&mut window, "Copy to A");
     assert!(window.query_by_label_contains("A → B:").is_none(), "both are the same");
     enter(&mut window, "pitch weight", "300");
-    click(&mut window, "Back to A");
+    click(&mut window, "Revert to A");
     assert_eq!(state(&window)["gain"], b["gain"]);
 }
 
@@ -167,7 +168,7 @@ fn peak_torques_follow_in_the_same_frame_and_the_simulated_robot_has_the_last_wo
     window.get_by_label("lean: bad");
     window.get_by_label_contains("lean: the simulated robot falls");
     click(&mut window, "torque limit");
-    window.get_by_label_contains("Tick “torque limit”");
+    window.get_by_label_contains("Enable “torque limit”");
 }
 
 #[test]
@@ -181,7 +182,7 @@ fn margins_have_a_verdict_and_a_sentence_and_poles_a_list() {
     enter(&mut window, "left torque weight", "1e-5");
     let bad = state(&window)["tune_tab"]["margins"].clone();
     assert!(bad["delay_s"].as_f64() < good["delay_s"].as_f64(), "{bad:#}");
-    let told = ["Unstable as it runs", "Hardly stable", "Tight"];
+    let told = ["Unstable when sampled", "Barely stable", "Tight"];
     assert!(told.iter().any(|text| window.query_by_label_contains(text).is_some()));
 }
 
@@ -193,7 +194,7 @@ fn weights_without_a_design_leave_the_last_gains_in_force_and_say_so() {
     let after = state(&window);
     assert!(after["design_problem"].is_string(), "{after:#}");
     assert_eq!(after["gain"], before["gain"]);
-    window.get_by_label("The last good gains stay in force; they are shown here.");
+    window.get_by_label("The last valid gains remain active and are shown here.");
 }
 
 #[test]
@@ -201,7 +202,7 @@ fn one_weight_of_the_motors_moves_the_other_unless_unlinked() {
     let mut window = open(options(Tab::Tune), SIZE);
     enter(&mut window, "right torque weight", "40");
     assert_eq!(state(&window)["r_diagonal"], serde_json::json!([40.0, 40.0]));
-    click(&mut window, "Same for both motors");
+    click(&mut window, "Same weight for both motors");
     enter(&mut window, "right torque weight", "10");
     let after = state(&window);
     assert_eq!(after["r_diagonal"], serde_json::json!([40.0, 10.0]));
@@ -253,7 +254,7 @@ fn can_is_honest_about_being_not_connected() {
     let mut window = open(WindowOptions { paused: false, ..options(Tab::Tune) }, SIZE);
     click(&mut window, "CAN");
     window.get_by_label("CAN: not connected");
-    window.get_by_label_contains("until a robot is connected on the Robot tab");
+    window.get_by_label_contains("Connect a robot on the Robot tab");
     let state = state(&window);
     assert_eq!((&state["source"], &state["simulation"]["paused"]), (&"can".into(), &true.into()));
     assert!(window.query_by_label("Push").is_none(), "no controls of the simulated robot");
@@ -288,8 +289,7 @@ fn the_simulated_robot_runs_is_pushed_paused_and_reset() {
 #[test]
 fn without_a_design_nothing_runs_until_there_is_one() {
     let bad = ROBOT.replace("[60.0, 30.0", "[-1.0, 30.0").replace("Test robot", "No design");
-    for (name, text, shown) in
-        [("undesigned.toml", &*bad, "no design, nothing runs"), ("no-robot.toml", RAIL, "no robot")]
+    for (name, text, shown) in [("undesigned.toml", &*bad, "no design"), ("no-robot.toml", RAIL, "no robot")]
     {
         let file = TempFile::new(name, text);
         let mut window = open(WindowOptions { paused: false, ..options(Tab::Tune) }, SIZE);
@@ -297,7 +297,7 @@ fn without_a_design_nothing_runs_until_there_is_one() {
         enter(&mut window, "model path", file.name());
         let loaded = until(&mut window, "loading", |s| s["model"] != "Test robot");
         assert!(loaded["gain"].is_null() && loaded["simulation"]["displacement_mm"].is_null(), "{loaded:#}");
-        window.get_by_label(shown);
+        assert!(window.get_all_by_label(shown).count() > 0);
         // The robot of before would bring samples several times in this while.
         for _ in 0..60 {
             window.step();
@@ -327,7 +327,7 @@ fn a_log_is_loaded_by_path_fitted_and_used() {
     let used = state(&window);
     assert_eq!(used["friction"][1]["coulomb_nm"].as_f64(), Some(coulomb));
     assert_eq!(used["friction"][0], loaded["friction"][0], "the left motor is as before");
-    assert_eq!(used["undo"], serde_json::json!(["use of the fit"]));
+    assert_eq!(used["undo"], serde_json::json!(["use fit in model"]));
     click(&mut window, "Rows");
     window.get_by_label("speed_rad_s");
 }
@@ -362,8 +362,8 @@ fn a_log_of_a_linear_axis_is_fitted_although_the_model_is_a_robot() {
     let ended = until(&mut window, "the fit", |s| s["friction_tab"]["fit"]["running"] == false);
     let mass = ended["friction_tab"]["fit"]["parameters"]["mass_kg"]["value"].as_f64();
     assert!(mass.is_some_and(|mass| (mass - 20.0).abs() < 0.4), "{ended:#}");
-    window.get_by_label_contains("open the model of a linear axis");
-    window.get_by_label_contains("means from peak to peak");
+    window.get_by_label_contains("Open the model of a linear axis");
+    window.get_by_label_contains("peak-to-peak of the means");
     assert!(window.query_by_label("Both motors").is_none(), "a carriage is no motor");
     click(&mut window, "Axis");
     assert_eq!(state(&window)["friction"], ended["friction"], "newtons are no torque");
@@ -574,7 +574,7 @@ fn a_file_that_was_not_loaded_is_kept_unless_the_user_says_overwrite() {
         click(window, "Save");
         until(window, "the question", |s| s["question"] == "overwrite");
         window.run_steps(2);
-        window.get_by_label(&format!("There is already a file {}.", file.name()));
+        window.get_by_label(&format!("The file {} exists.", file.name()));
     };
     ask(&mut window);
     click(&mut window, "Cancel");
@@ -694,7 +694,7 @@ fn margins_are_told_for_the_delay_that_the_model_has() {
     }
     let window = of(0.06);
     assert!(window.query_by_label("gain up").is_none());
-    assert!(window.query_by_label_contains("Unstable as it runs (1 kHz, 60 ms of delay").is_some());
+    assert!(window.query_by_label_contains("Unstable when sampled (1 kHz, 60 ms of delay").is_some());
 }
 
 #[test]
@@ -702,7 +702,7 @@ fn a_dragged_pole_takes_the_weights_with_it_in_one_step() {
     let mut window = open(options(Tab::Tune), SIZE);
     let weights = |window: &Window| state(window)["q_diagonal"].clone();
     let before = weights(&window);
-    let plane = window.get_by_label("plane of poles").rect();
+    let plane = window.get_by_label("pole map").rect();
     // Where the poles are, the plane alone knows: the pointer looks for one, a reach at a time.
     let places = (0..12).flat_map(|row| (0..10).map(move |column| (row, column)));
     let moved = places.into_iter().any(|(row, column)| {

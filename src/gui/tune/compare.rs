@@ -1,4 +1,4 @@
-//! Two designs, A and B: which one is in force, and in what they differ.
+//! Two designs, A and B: which one is active, and in what they differ.
 
 use egui::{CollapsingHeader, Grid, RichText, Ui};
 
@@ -12,20 +12,20 @@ use crate::widgets::{change, hint_ui, mono, section_ui, shown};
 /// Relative difference below which numbers count as the same.
 const SAME: f64 = 1e-9;
 
-/// Chooses which of the two designs is in force.
+/// Chooses which of the two designs is active.
 pub(super) fn slots_ui(context: &ViewContext<'_>, ui: &mut Ui) {
     let designer = context.designer;
     let other = designer.active.other().name();
     section_ui(ui, "Design", |ui| {
         let copy =
             ui.add_enabled(designer.different().is_some(), egui::Button::new(format!("Copy to {other}")));
-        let help = format!("Make {other} the same as the design in force, to compare what comes next with");
+        let help = format!("Copy the active design to {other}, for comparison");
         if copy.on_hover_text(help).clicked() {
             context.commands.send(Command::KeepReference);
         }
         let back =
-            ui.add_enabled(designer.different().is_some(), egui::Button::new(format!("Back to {other}")));
-        let help = format!("Take the weights of {other} again, in {} too", designer.active.name());
+            ui.add_enabled(designer.different().is_some(), egui::Button::new(format!("Revert to {other}")));
+        let help = format!("Copy the weights of {other} to {}", designer.active.name());
         if back.on_hover_text(help).clicked() {
             context.commands.send(Command::RestoreReference);
         }
@@ -35,9 +35,9 @@ pub(super) fn slots_ui(context: &ViewContext<'_>, ui: &mut Ui) {
         for slot in [Slot::B, Slot::A] {
             let active = slot == designer.active;
             let help = if active {
-                format!("{} is in force: the robot runs with it, and changes go to it", slot.name())
+                format!("{} is active: the robot uses it, and edits change it", slot.name())
             } else {
-                format!("Let {} come into force; {} is kept", slot.name(), designer.active.name())
+                format!("Make {} active; {} is unchanged", slot.name(), designer.active.name())
             };
             let choice = ui.selectable_label(active, RichText::new(slot.name()).strong());
             if choice.accessible_name(format!("design {}", slot.name())).on_hover_text(help).clicked()
@@ -49,7 +49,7 @@ pub(super) fn slots_ui(context: &ViewContext<'_>, ui: &mut Ui) {
     });
 }
 
-/// What differs between both designs.
+/// Differences between both designs.
 pub(super) fn differences_ui(context: &ViewContext<'_>, peaks_nm: [f64; 2], ui: &mut Ui) {
     let designer = context.designer;
     let (Some(now), Some(other)) = (designer.in_force, designer.different()) else { return };

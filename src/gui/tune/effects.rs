@@ -1,8 +1,8 @@
-//! Effects that the model has beside its declared numbers: their sizes, and whether the controller cancels them.
+//! Effects that the model has next to its declared numbers: their sizes, and whether the controller cancels them.
 
 use egui::{Button, Checkbox, CollapsingHeader, Grid, Ui};
-use flqr_core::effects::{Effect, Feedforward, name_and_unit};
-use flqr_core::model_file::Rig;
+use flqr_core::effects::{Feedforward, name_and_unit};
+use flqr_core::model::{Effect, Rig};
 use flqr_core::report::capitalised;
 
 use crate::command::Command;
@@ -20,7 +20,7 @@ pub(super) fn ui(context: &ViewContext<'_>, ui: &mut Ui) {
     }
     ui.add_space(4.0);
     CollapsingHeader::new("Effects").default_open(true).show(ui, |ui| {
-        hint_ui(ui, "What the simulated machine does beside the numbers above.");
+        hint_ui(ui, "Effects of the simulated machine.");
         let mut changed = None;
         for (index, effect) in effects.iter().enumerate() {
             match effect_ui(index, effect, ui) {
@@ -31,7 +31,7 @@ pub(super) fn ui(context: &ViewContext<'_>, ui: &mut Ui) {
                         all[index] = other;
                         changed = Some(all);
                     }
-                    Err(problem) => context.commands.send(Command::Say(format!("Not taken: {problem}."))),
+                    Err(problem) => context.commands.send(Command::Say(format!("Not accepted: {problem}."))),
                 },
                 Some(Change::Remove) => {
                     let mut all = effects.clone();
@@ -60,19 +60,17 @@ fn effect_ui(index: usize, effect: &Effect, ui: &mut Ui) -> Option<Change> {
         ui.strong(&name).on_hover_text(format!("{}.", capitalised(kind.summary)));
         let remove = ui.add(Button::new("×").small().frame(false));
         let remove = remove.accessible_name(format!("remove {name}"));
-        if remove.on_hover_text("Take it out of the model; undo brings it back").clicked() {
+        if remove.on_hover_text("Remove from the model").clicked() {
             change = Some(Change::Remove);
         }
     });
     let mut fed = effect.is_fed_forward();
     let (can_be_fed, help) = match kind.feedforward {
-        Feedforward::Causal => {
-            (true, "FLQR adds what cancels it; the simulated machine has it either way".to_owned())
-        }
-        Feedforward::Never(reason) => (false, format!("No controller can cancel it: {reason}")),
-        Feedforward::Declared => (false, "The controller has it through the corrected number".to_owned()),
+        Feedforward::Causal => (true, "Compensated by FLQR; always present in the simulation".to_owned()),
+        Feedforward::Never(reason) => (false, format!("Cannot be compensated: {reason}")),
+        Feedforward::Declared => (false, "The controller uses the corrected parameter".to_owned()),
     };
-    let tick = ui.add_enabled(can_be_fed, Checkbox::new(&mut fed, "cancelled by FLQR"));
+    let tick = ui.add_enabled(can_be_fed, Checkbox::new(&mut fed, "compensated by FLQR"));
     let tick = tick.accessible_name(format!("cancel {name}"));
     if tick.on_hover_text(&help).on_disabled_hover_text(&help).changed() {
         change = Some(Change::Feedforward(fed));

@@ -1,4 +1,4 @@
-//! Gains of the design in force, and the controller that they are part of.
+//! Gains of the design active, and the controller that they are part of.
 
 use egui::{Grid, RichText, Ui};
 use flqr_core::control::ControllerKind;
@@ -18,22 +18,21 @@ const COLUMNS: [(&str, &str); 4] = [
     ("rate", "N m per rad/s of pitch rate"),
 ];
 
-/// What follows from the weights.
+/// Results of the weights.
 pub(super) fn ui(context: &ViewContext<'_>, ui: &mut Ui) {
     let designer = context.designer;
     section_ui(ui, "Gains", |ui| {
         hint_ui(ui, format!("{:.1} µs", 1e6 * designer.solve_s))
-            .on_hover_text("Duration of the last design, from the weights to gains, poles and residual");
+            .on_hover_text("Computing time of the last design");
         if let Some(designed) = &designer.in_force {
-            hint_ui(ui, format!("residual {}", shown(designed.design.riccati_residual, 2))).on_hover_text(
-                "Riccati residual: norm of AᵀP + PA − PBR⁻¹BᵀP + Q relative to that of P, how exact the solution is",
-            );
+            hint_ui(ui, format!("residual {}", shown(designed.design.riccati_residual, 2)))
+                .on_hover_text("Riccati residual: norm of AᵀP + PA − PBR⁻¹BᵀP + Q relative to the norm of P");
         }
     });
     if let Some(problem) = &designer.problem {
         error_ui(ui, format!("No design: {problem}."));
         if designer.in_force.is_some() {
-            warning_ui(ui, "The last good gains stay in force; they are shown here.");
+            warning_ui(ui, "The last valid gains remain active and are shown here.");
         }
     }
     if let Some(designed) = &designer.in_force {
@@ -71,7 +70,7 @@ fn gain_rows_ui(ui: &mut Ui, design: &LqrDesign, prefix: &str, color: egui::Colo
     }
 }
 
-/// Whether both motors get the same torque, to the precision of the design.
+/// Returns whether both motors get the same torque, to the precision of the design.
 fn rows_are_equal(design: &LqrDesign) -> bool {
     (0..4).all(|column| {
         let (left, right) = (design.gain[(0, column)], design.gain[(1, column)]);
@@ -87,8 +86,8 @@ pub(super) fn controller_ui(context: &ViewContext<'_>, ui: &mut Ui) {
     ui.horizontal(|ui| {
         let mut kind = context.session.controller;
         let choices = [
-            (ControllerKind::Lqr, "LQR", "Gains alone"),
-            (ControllerKind::Flqr, "FLQR", "Gains plus friction feedforward"),
+            (ControllerKind::Lqr, "LQR", "State feedback only"),
+            (ControllerKind::Flqr, "FLQR", "State feedback plus friction feedforward"),
         ];
         ui.scope(|ui| {
             if choice_ui(ui, &mut kind, &choices) {
@@ -99,18 +98,17 @@ pub(super) fn controller_ui(context: &ViewContext<'_>, ui: &mut Ui) {
             ui.spacing_mut().item_spacing.x = 5.0;
             ui.label("ratio");
             number_ui(ui, &mut compensation.ratio, "compensation ratio", 44.0)
-                .on_hover_text("Share of the friction that is fed forward");
+                .on_hover_text("Fraction of the friction compensated by feedforward");
             ui.label("smoothing");
-            number_ui(ui, &mut compensation.smoothing_speed_rad_s, "smoothing speed", 44.0).on_hover_text(
-                "Speed over which the direction turns from −1 to 1, so that the feedforward does not chatter at rest",
-            );
+            number_ui(ui, &mut compensation.smoothing_speed_rad_s, "smoothing speed", 44.0)
+                .on_hover_text("Smoothing speed of the friction direction, to avoid chatter at standstill");
             ui.label(RichText::new("rad/s").small());
         });
     });
     if compensation != before {
         match compensation.validate() {
             Ok(()) => context.commands.send(Command::SetCompensation(compensation)),
-            Err(problem) => context.commands.send(Command::Say(format!("Not taken: {problem}."))),
+            Err(problem) => context.commands.send(Command::Say(format!("Not accepted: {problem}."))),
         }
     }
     if let Some(problem) = context.session.feedforward_problem().filter(|_| active) {

@@ -66,13 +66,13 @@ impl LivePlots {
         if context.source == Source::Simulated {
             simulated_ui(context, ui);
         } else if history.time_s().is_empty() {
-            hint_ui(
-                ui,
-                "No row of displacement, velocity and pitch has come yet: they need both motors and the IMU.",
-            );
+            hint_ui(ui, "No displacement, velocity and pitch yet: they need both motors and the IMU.");
         }
         if history.dropped() > 0 {
-            hint_ui(ui, format!("The oldest {} samples were dropped: 2 h are kept.", history.dropped()));
+            hint_ui(
+                ui,
+                format!("The oldest {} samples were dropped; the last 2 h are stored.", history.dropped()),
+            );
         }
         if self.stack.exports() {
             self.stack.sources = vec![source(context)];
@@ -112,7 +112,7 @@ impl LivePlots {
         });
         combo
             .response
-            .on_hover_text("Length of the time axis; the last 2 h at 1 kHz are kept")
+            .on_hover_text("Length of the time axis; the last 2 h at 1 kHz are stored")
             .accessible_name("time span");
         let rate = RATES.iter().find(|(ms, _)| *ms == self.interval_ms).map_or("", |(_, name)| name);
         let combo = ComboBox::from_id_salt("rate").selected_text(rate).width(56.0).show_ui(ui, |ui| {
@@ -123,7 +123,7 @@ impl LivePlots {
                 }
             }
         });
-        combo.response.on_hover_text("How often the plots are drawn").accessible_name("frame rate");
+        combo.response.on_hover_text("Refresh rate of the plots").accessible_name("frame rate");
     }
 }
 
@@ -167,7 +167,7 @@ fn panels<'a>(context: &ViewContext<'a>, ui: &Ui) -> Vec<Panel<'a>> {
     Channel::ALL.into_iter().enumerate().map(panel).collect()
 }
 
-/// Where the curves come from, for exports: they are no run of the ledger.
+/// Source of the curves, for exports: they are no run of the ledger.
 fn source(context: &ViewContext<'_>) -> String {
     let model = context.session.model();
     let sources = Sources::new(Some(&model), []);
@@ -177,37 +177,37 @@ fn source(context: &ViewContext<'_>) -> String {
 fn run_ui(context: &ViewContext<'_>, ui: &mut Ui) {
     let paused = context.live.paused;
     let (name, help) = if paused {
-        ("Run", "Let the simulated robot go on (Ctrl+P)")
+        ("Run", "Resume the simulated robot (Ctrl+P)")
     } else {
-        ("Pause", "Hold the simulated robot (Ctrl+P)")
+        ("Pause", "Pause the simulated robot (Ctrl+P)")
     };
     let button = ui.add(egui::Button::new(name).min_size(egui::vec2(52.0, 0.0))).on_hover_text(help);
     if button.clicked() {
         context.commands.send(Command::SetPaused(!paused));
     }
-    if ui.button("Reset").on_hover_text("Put the robot at the start and clear the plots").clicked() {
+    if ui.button("Reset").on_hover_text("Restart the robot and clear the plots").clicked() {
         context.commands.send(Command::ResetSimulation);
     }
     ui.separator();
 }
 
-/// Why the simulated robot does not run, if so.
+/// Reason why the simulated robot does not run, if any.
 fn simulated_ui(context: &ViewContext<'_>, ui: &mut Ui) {
     if context.live.fell {
-        warning_ui(ui, "The robot fell (pitch beyond 0.8 rad) and is stopped. Reset puts it upright again.");
+        warning_ui(ui, "The robot fell (pitch beyond 0.8 rad). Reset restarts it.");
     }
     if context.designer.in_force.is_none() {
-        error_ui(ui, "There is no design, so nothing runs: weights that give one start the robot.");
+        error_ui(ui, "The simulation is stopped because there is no valid design. Change the weights.");
     }
     if let Some(problem) = &context.live.problem {
-        error_ui(ui, format!("The simulated robot did not take the change: {problem}."));
+        error_ui(ui, format!("The simulation rejected the change: {problem}."));
     }
 }
 
 fn replay_ui(context: &ViewContext<'_>, ui: &mut Ui) {
     let paused = context.link.replay_is_paused;
     let (name, help) =
-        if paused { ("Run", "Let the replay go on (Ctrl+P)") } else { ("Pause", "Hold the replay (Ctrl+P)") };
+        if paused { ("Run", "Resume the replay (Ctrl+P)") } else { ("Pause", "Pause the replay (Ctrl+P)") };
     let button = ui.add(egui::Button::new(name).min_size(egui::vec2(52.0, 0.0))).on_hover_text(help);
     if button.clicked() {
         context.commands.send(Command::Order(SessionOrder::Pause(!paused)));

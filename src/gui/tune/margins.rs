@@ -1,4 +1,4 @@
-//! What the loop bears as it runs, sampled and delayed: each margin with its verdict, and a sentence.
+//! Stability margins of the sampled loop with delay: each margin with its verdict, and a sentence.
 
 use egui::{CollapsingHeader, Grid, Ui};
 use flqr_core::lqr::SampledPole;
@@ -19,22 +19,24 @@ struct Row {
     value: String,
     help: &'static str,
     verdict: Verdict,
-    /// What the robot does where it is used up.
+    /// Behaviour of the robot at the margin.
     then: String,
 }
 
-/// The margins of the design in force.
+/// The margins of the design active.
 pub(super) fn ui(designed: &Designed, poles: &[SampledPole], ui: &mut Ui) {
     let runs = runs(designed);
     section_ui(ui, "Stability", |ui| {
         hint_ui(ui, runs.as_str()).on_hover_text(
-            "The loop as it runs: time from a measurement to its torque, and the held samples of the IMU, are in all numbers here",
+            "Sampled loop: all values include the delay from measurement to torque and the sample-and-hold of the IMU",
         );
     });
     if !designed.margins.stable {
         error_ui(
             ui,
-            format!("Unstable as it runs ({runs}): less weight on the states, or more on the torques."),
+            format!(
+                "Unstable when sampled ({runs}): reduce the state weights or increase the torque weights."
+            ),
         );
         return;
     }
@@ -68,7 +70,7 @@ fn rows(designed: &Designed) -> Vec<Row> {
     let decibels = |factor: f64| format!("{} dB", shown(20.0 * factor.log10(), 2));
     let up = margins.gain_up;
     let phase_deg = margins.phase_rad.to_degrees();
-    // Without a delay of its own a loop is to bear that of one tick.
+    // Without a separate delay a loop is to bear that of one tick.
     let delays = margins.delay_s / timing.delay_s.max(timing.tick_s);
     vec![
         Row {
@@ -78,10 +80,10 @@ fn rows(designed: &Designed) -> Vec<Row> {
             } else {
                 "any".to_owned()
             },
-            help: "So much more torque per command (or gain) until it oscillates",
+            help: "Gain increase (torque per command) until instability",
             verdict: Verdict::of(up, GAIN_UP[0], GAIN_UP[1]),
             then: format!(
-                "with {} times the torque it swings at {}",
+                "unstable with {} times the torque, at {}",
                 shown(up, 3),
                 hertz(margins.gain_up_rad_s)
             ),
@@ -93,17 +95,17 @@ fn rows(designed: &Designed) -> Vec<Row> {
             } else {
                 "any".to_owned()
             },
-            help: "So much less torque per command (or gain) until it no longer holds the body up",
+            help: "Gain reduction (torque per command) until instability",
             verdict: Verdict::of(1.0 / margins.gain_down, GAIN_DOWN[0], GAIN_DOWN[1]),
-            then: format!("with {} of the torque it no longer balances", shown(margins.gain_down, 3)),
+            then: format!("unstable with {} of the torque", shown(margins.gain_down, 3)),
         },
         Row {
             name: "phase",
             value: format!("{}° at {}", shown(phase_deg, 3), hertz(margins.crossover_rad_s)),
-            help: "Lag between command and torque until it oscillates, and the frequency at which the loop's gain passes 1",
+            help: "Phase margin and gain crossover frequency",
             verdict: Verdict::of(phase_deg, PHASE_DEG[0], PHASE_DEG[1]),
             then: format!(
-                "with {}° more lag it swings at {}",
+                "unstable with {}° of additional phase lag, at {}",
                 shown(phase_deg, 3),
                 hertz(margins.crossover_rad_s)
             ),
@@ -111,26 +113,26 @@ fn rows(designed: &Designed) -> Vec<Row> {
         Row {
             name: "delay",
             value: format!("+{} ms", shown(1e3 * margins.delay_s, 3)),
-            help: "Delay on top of the loop's own until it oscillates; tight where that is less than twice what it has, bad where it is less than that",
+            help: "Additional delay until instability; tight below twice the delay of the loop, bad below the delay of the loop",
             verdict: Verdict::of(delays, DELAYS[0], DELAYS[1]),
-            then: format!("{} ms more delay make it swing", shown(1e3 * margins.delay_s, 3)),
+            then: format!("unstable with {} ms of additional delay", shown(1e3 * margins.delay_s, 3)),
         },
     ]
 }
 
-/// What the worst margin means for the robot, and the mend.
+/// Meaning of the worst margin for the robot, and the remedy.
 fn sentence_ui(ui: &mut Ui, rows: &[Row]) {
     let Some(worst) = rows.iter().max_by_key(|row| row.verdict) else { return };
-    let mend = "More weight on the torques slows the loop down, less on the rates calms it.";
+    let remedy = "Increase the torque weights to slow the loop down, or reduce the rate weights.";
     match worst.verdict {
         Verdict::Good => {
-            hint_ui(ui, "It bears motors that are stronger, weaker or later than the model says.");
+            hint_ui(ui, "Tolerates errors of motor gain and delay.");
         }
         Verdict::Tight => {
-            warning_ui(ui, format!("Tight: {}. {mend}", worst.then));
+            warning_ui(ui, format!("Tight: {}. {remedy}", worst.then));
         }
         Verdict::Bad => {
-            error_ui(ui, format!("Hardly stable: {}. {mend}", worst.then));
+            error_ui(ui, format!("Barely stable: {}. {remedy}", worst.then));
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Q and R in full, for those who want entries off the diagonal.
 
 use egui::Ui;
-use flqr_core::lqr::Weights;
+use flqr_core::model::Weights;
 use nalgebra::SMatrix;
 
 use crate::quantity::{MOTORS, STATES};

@@ -91,7 +91,7 @@ impl TuneTab {
         self.files = ModelFiles::new(Some(path));
     }
 
-    /// What the page shows of a design, as `--state-out` writes it.
+    /// State of a design for `--state-out`.
     pub(crate) fn snapshot(&self, designer: &Designer) -> serde_json::Value {
         serde_json::json!({
             "design": designer.active.name(),
@@ -190,7 +190,7 @@ fn no_robot_ui(context: &ViewContext<'_>, ui: &mut Ui) {
     ui.add_space(60.0);
     ui.vertical_centered(|ui| {
         ui.heading("This model is a single axis: there is nothing to balance");
-        hint_ui(ui, "Fit its friction on the friction tab, or load the model of a robot.");
+        hint_ui(ui, "Fit its friction on the Friction tab, or load the model of a robot.");
         if ui.button("Load the paper's robot").clicked() {
             context.commands.send(Command::LoadPreset(0));
         }
@@ -201,8 +201,8 @@ fn not_connected_ui(context: &ViewContext<'_>, ui: &mut Ui) {
     ui.add_space(0.3 * ui.available_height());
     ui.vertical_centered(|ui| {
         ui.heading(format!("{}: not connected", context.source.name()));
-        hint_ui(ui, "There is nothing measured to show here until a robot is connected on the Robot tab.");
-        hint_ui(ui, "The simulated robot is paused and is not shown as if it were the real one.");
+        hint_ui(ui, "Connect a robot on the Robot tab to show measurements here.");
+        hint_ui(ui, "The simulated robot is paused.");
         ui.add_space(8.0);
         if ui.button("Connect on the Robot tab").clicked() {
             context.commands.send(Command::SelectTab(Tab::Robot));

@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use egui::{TextEdit, Ui};
-use flqr_core::model_file::{ModelWarning, Rig, presets};
+use flqr_core::model::Rig;
+use flqr_core::model_file::{ModelWarning, presets};
 
 use crate::command::{Command, FilePurpose};
 use crate::context::ViewContext;
@@ -64,13 +65,13 @@ impl ModelFiles {
         if ui.button("Open…").on_hover_text("Choose a model file (Ctrl+O)").clicked() {
             context.commands.send(Command::ShowDialog(FilePurpose::OpenModel));
         }
-        let load = ui.add_enabled(typed, egui::Button::new("Load")).on_hover_text("Load the path above");
+        let load = ui.add_enabled(typed, egui::Button::new("Load")).on_hover_text("Load this path");
         if load.clicked() || (entered && typed) {
             self.problem = None;
             context.commands.send(Command::LoadModel(path.clone()));
         }
         let save = ui.add_enabled(typed, egui::Button::new("Save"));
-        if save.on_hover_text("Save to the path above; a file other than the loaded one is replaced only after a question. Ctrl+S saves to the loaded file").clicked() {
+        if save.on_hover_text("Save to this path; you are asked before another file is overwritten. Ctrl+S saves to the loaded file").clicked() {
             self.problem = None;
             context.commands.send(Command::SaveModel(path));
         }

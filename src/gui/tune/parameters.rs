@@ -5,8 +5,8 @@ use std::sync::LazyLock;
 use egui::{CollapsingHeader, Grid, Ui};
 use flqr_core::ParameterError;
 use flqr_core::friction::{Stribeck, StribeckParameters};
+use flqr_core::model::RobotParameters;
 use flqr_core::model_file::presets;
-use flqr_core::robot::RobotParameters;
 
 use crate::command::Command;
 use crate::context::ViewContext;
@@ -14,7 +14,7 @@ use crate::quantity::MOTORS;
 use crate::session::Session;
 use crate::widgets::{error_ui, hint_ui, number_ui, section_ui};
 
-/// What a motor without friction or limit begins with: the left motor of the paper's preset.
+/// Initial values for a motor without friction or limit: the left motor of the paper's preset.
 struct FirstValues {
     curve: StribeckParameters,
     torque_limit_nm: f64,
@@ -29,7 +29,7 @@ static FIRST_VALUES: LazyLock<FirstValues> = LazyLock::new(|| {
     values.expect("the paper's preset has friction and a torque limit, as a test of this page finds")
 });
 
-/// What has been typed.
+/// Typed text.
 pub(super) struct ParameterEditor {
     robot: Option<RobotParameters>,
     friction: [Option<StribeckParameters>; 2],
@@ -50,17 +50,15 @@ const ROBOT_FIELDS: [Field<RobotParameters>; 7] = [
     ("body_inertia_kg_m2", "body inertia", "kg m²", "About the body's centre of mass", |p| {
         &mut p.body_inertia_kg_m2
     }),
-    ("gravity_m_s2", "gravity", "m/s²", "Acceleration of free fall", |p| &mut p.gravity_m_s2),
+    ("gravity_m_s2", "gravity", "m/s²", "Gravitational acceleration", |p| &mut p.gravity_m_s2),
 ];
 
 const FRICTION_FIELDS: [Field<StribeckParameters>; 6] = [
-    ("coulomb_nm", "Coulomb", "N m", "Level of sliding friction", |p| &mut p.coulomb_nm),
-    ("static_nm", "static", "N m", "Level at which the resting shaft breaks away", |p| &mut p.static_nm),
-    ("viscous_nm_s_rad", "viscous", "N m s/rad", "Grows with the speed", |p| &mut p.viscous_nm_s_rad),
-    ("stribeck_speed_rad_s", "Stribeck speed", "rad/s", "Speed over which static friction fades", |p| {
-        &mut p.stribeck_speed_rad_s
-    }),
-    ("stribeck_exponent", "exponent", "", "Shape of that fading", |p| &mut p.stribeck_exponent),
+    ("coulomb_nm", "Coulomb", "N m", "Coulomb friction", |p| &mut p.coulomb_nm),
+    ("static_nm", "static", "N m", "Static (breakaway) friction", |p| &mut p.static_nm),
+    ("viscous_nm_s_rad", "viscous", "N m s/rad", "Viscous friction coefficient", |p| &mut p.viscous_nm_s_rad),
+    ("stribeck_speed_rad_s", "Stribeck speed", "rad/s", "Stribeck speed", |p| &mut p.stribeck_speed_rad_s),
+    ("stribeck_exponent", "exponent", "", "Stribeck exponent", |p| &mut p.stribeck_exponent),
     ("offset_nm", "offset", "N m", "Constant offset", |p| &mut p.offset_nm),
 ];
 
@@ -110,7 +108,7 @@ impl ParameterEditor {
         let before = self.torque_limit_nm;
         ui.horizontal(|ui| {
             let mut limited = self.torque_limit_nm.is_some();
-            let help = "Largest torque of one motor; without it the simulated motors are unlimited";
+            let help = "Torque limit of one motor; without it, the simulated motors are unlimited";
             if ui.checkbox(&mut limited, "torque limit").on_hover_text(help).changed() {
                 self.torque_limit_nm = limited.then(|| FIRST_VALUES.torque_limit_nm);
             }
@@ -121,7 +119,7 @@ impl ParameterEditor {
         });
         let valid = self.torque_limit_nm.is_none_or(|limit| limit > 0.0);
         if !valid {
-            error_ui(ui, "the torque limit must be above 0; the last good one stays in force");
+            error_ui(ui, "the torque limit must be above 0; the last valid value remains active");
         } else if self.torque_limit_nm != before {
             context.commands.send(Command::SetTorqueLimit(self.torque_limit_nm));
         }
@@ -133,7 +131,7 @@ impl ParameterEditor {
             ui.label("");
             for (motor, name) in MOTORS.into_iter().enumerate() {
                 let mut present = self.friction[motor].is_some();
-                let help = format!("Whether the {name} motor has friction");
+                let help = format!("Friction of the {name} motor");
                 if ui.checkbox(&mut present, name).on_hover_text(help).changed() {
                     self.friction[motor] = present.then(|| FIRST_VALUES.curve);
                 }
@@ -164,7 +162,7 @@ impl ParameterEditor {
         let curves = self.friction.map(|parameters| parameters.map(Stribeck::new));
         for (curve, side) in curves.iter().zip(MOTORS) {
             if let Some(Err(problem)) = curve {
-                error_ui(ui, format!("{side} motor: {problem}; the last good curve stays in force"));
+                error_ui(ui, format!("{side} motor: {problem}; the last valid curve remains active"));
             }
         }
         let good = curves.iter().all(|curve| !matches!(curve, Some(Err(_))));
@@ -179,6 +177,6 @@ fn problem_row_ui(ui: &mut Ui, refused: Option<&ParameterError>, key: &str) {
     let Some(problem) = refused.filter(|problem| problem.name == key) else { return };
     ui.label("");
     error_ui(ui, format!("must be {}", problem.allowed))
-        .on_hover_text(format!("{problem}; the last good value stays in force"));
+        .on_hover_text(format!("{problem}; the last valid value remains active"));
     ui.end_row();
 }

@@ -1,9 +1,9 @@
-//! Poles of the loop as it runs, on the plane of s or of z, with lines of equal damping and rings of equal frequency.
+//! Poles of the sampled loop, on the plane of s or of z, with lines of equal damping and rings of equal frequency.
 
 use egui::{Color32, Pos2, Response, Stroke, Ui, Vec2};
 use egui_plot::{Line, LineStyle, MarkerShape, PlotBounds, PlotPoints, PlotTransform, PlotUi, Points, Text};
-use flqr_core::lqr::{SampledPole, Weights, weights_for_pole};
-use flqr_core::robot::RobotParameters;
+use flqr_core::lqr::{SampledPole, weights_for_pole};
+use flqr_core::model::{RobotParameters, Weights};
 use nalgebra::Complex;
 
 use super::margins::complex;
@@ -16,14 +16,14 @@ use crate::widgets::{choice_ui, shown, warning_ui};
 
 /// Dampings that are drawn as lines.
 const DAMPINGS: [f64; 4] = [0.3, 0.5, 0.7, 0.9];
-/// Rays from this damping on have their names beside them.
+/// Rays from this damping on have their names next to them.
 const NAMED: f64 = 0.5;
 /// Poles that set the view: the plant's own are the slowest.
 const PLANTS: usize = 4;
 /// From the pointer to a pole that is told of, points.
 const REACH: f32 = 14.0;
 const RING_POINTS: usize = 96;
-/// How far the plane of s is seen to the left and to the right, in half widths.
+/// Visible range of the s-plane to the left and to the right, in half widths.
 const LEFT: f64 = 1.7;
 const RIGHT: f64 = 0.3;
 
@@ -43,15 +43,15 @@ struct Drag {
     start: Weights,
     robot: RobotParameters,
     from: Complex<f64>,
-    /// Where the pointer was last, 1/s.
+    /// Last position of the pointer, 1/s.
     at: Option<Complex<f64>>,
     /// The view, which rests until the pole is let go.
     bounds: PlotBounds,
-    /// How near it comes, while no weights take it to the pointer.
+    /// Nearest reachable pole, if no weights reach the pointer.
     refused: Option<Complex<f64>>,
 }
 
-/// What is chosen.
+/// Selection.
 #[derive(Default)]
 pub(super) struct PolePlane {
     plane: Plane,
@@ -60,10 +60,10 @@ pub(super) struct PolePlane {
     spent: Option<(Weights, String)>,
 }
 
-/// A weight that falls below this share of what it was holds nothing any more.
+/// A weight that falls below this fraction of what it was holds nothing any more.
 const SPENT: f64 = 1e-3;
 
-/// What to say where a drag leaves next to nothing of a weight that was there.
+/// Warning for a drag that reduces a weight to nearly zero.
 fn spent(before: &Weights, now: &Weights) -> Option<String> {
     let is_spent = |index: &usize| {
         let (before, now) = (before.q[(*index, *index)], now.q[(*index, *index)]);
@@ -75,20 +75,20 @@ fn spent(before: &Weights, now: &Weights) -> Option<String> {
         format!("{} weight {before} → {now}", STATES[*index])
     };
     let listed = gone.iter().map(weight).collect::<Vec<_>>().join(", ");
-    let meaning = if gone.contains(&0) { ": the robot hardly returns to its place" } else { "" };
-    (!gone.is_empty()).then(|| format!("This place costs the {listed}{meaning}. Undo brings it back."))
+    let meaning = if gone.contains(&0) { ": the robot barely returns to its position" } else { "" };
+    (!gone.is_empty()).then(|| format!("This pole location removes the {listed}{meaning}. Undo restores it."))
 }
 
 impl PolePlane {
     pub(super) fn choice_ui(&mut self, ui: &mut Ui) {
         let choices = [
-            (Plane::S, "s", "Poles as rates, 1/s: left of 0 they die out, far left fast"),
-            (Plane::Z, "z", "Poles as factors over one IMU period: inside of the unit circle they die out"),
+            (Plane::S, "s", "s-plane, 1/s: stable in the left half plane"),
+            (Plane::Z, "z", "z-plane for one IMU period: stable inside the unit circle"),
         ];
         ui.scope(|ui| choice_ui(ui, &mut self.plane, &choices));
     }
 
-    /// Draws the poles of the design in force and of the other one.
+    /// Draws the poles of the design active and of the other one.
     pub(super) fn ui(
         &mut self,
         context: &ViewContext<'_>,
@@ -136,7 +136,7 @@ impl PolePlane {
         self.drag_ui(context, now, &shown.response, &shown.transform);
         self.spent_ui(context, &shown.response, ui);
         let refused = self.drag.as_ref().and_then(|drag| drag.refused);
-        shown.response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "plane of poles"));
+        shown.response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "pole map"));
         shown.response.on_hover_ui_at_pointer(|ui| {
             if let Some(refused) = refused {
                 warning_ui(ui, refused_text(refused));
@@ -144,13 +144,13 @@ impl PolePlane {
             }
             ui.label(match nearest {
                 Some((name, pole)) => told(name, &pole, named),
-                None => "Poles of the loop as it runs, with its delay and held IMU. Rays: damping; rings: frequency. Point at a pole to read it, drag it to another place and the weights follow."
+                None => "Closed-loop poles including delay and IMU sampling. Rays: damping ratio; rings: natural frequency. Hover over a pole for its values; drag it to change the weights."
                     .to_owned(),
             });
         });
     }
 
-    /// Over the foot of the plane, for as long as these weights are in force.
+    /// Over the foot of the plane, for as long as these weights are active.
     fn spent_ui(&self, context: &ViewContext<'_>, plane: &Response, ui: &mut Ui) {
         let Some((_, text)) = self.spent.as_ref().filter(|(of, _)| *of == context.session.weights()) else {
             return;
@@ -253,18 +253,15 @@ impl PolePlane {
 }
 
 fn refused_text(nearest: Complex<f64>) -> String {
-    format!(
-        "No weights put the pole there: on the way there it comes to {} 1/s.",
-        complex(nearest.re, nearest.im)
-    )
+    format!("No weights place the pole there: the nearest is {} 1/s.", complex(nearest.re, nearest.im))
 }
 
 fn told(name: &str, pole: &SampledPole, named: bool) -> String {
     let of = if named { format!("{name}: ") } else { String::new() };
     let time = if pole.s.re < 0.0 {
-        format!("fades to 1/e in {} ms", shown(-1e3 / pole.s.re, 3))
+        format!("time constant {} ms", shown(-1e3 / pole.s.re, 3))
     } else {
-        "does not die out".to_owned()
+        "not asymptotically stable".to_owned()
     };
     format!(
         "{of}s = {} 1/s\ndamping {}, {} Hz\n{time}\nz = {}",
@@ -374,11 +371,11 @@ mod tests {
         };
         let text = with(0, 3e-9).unwrap();
         assert!(
-            text.contains("displacement weight 60.0 → 3.00e−9") && text.contains("hardly returns"),
+            text.contains("displacement weight 60.0 → 3.00e−9") && text.contains("barely returns"),
             "{text}"
         );
         let text = with(2, 0.0).unwrap();
-        assert!(text.contains("pitch weight 100 → 0.00") && !text.contains("hardly returns"), "{text}");
+        assert!(text.contains("pitch weight 100 → 0.00") && !text.contains("barely returns"), "{text}");
         assert_eq!([with(0, 0.1), with(3, 0.0), with(1, 900.0)], [None, None, None]);
     }
 }

@@ -1,9 +1,9 @@
-//! What the loop as it runs will do after a disturbance, for the design in force and the other one; and its poles.
+//! Predicted response of the sampled loop to a disturbance, for the active and the other design, and its poles.
 
 use egui::{Color32, Ui, Vec2, vec2};
 use egui_plot::{Corner, HLine, Legend, Line, LineStyle, Plot, PlotPoint, PlotPoints};
 use flqr_core::lqr::{Disturbance, SampledPole, SampledResponse, sampled_poles, sampled_response};
-use flqr_core::robot::State;
+use flqr_core::model::State;
 
 use super::pole_plane::PolePlane;
 use super::trials::Trials;
@@ -22,10 +22,10 @@ const LONGEST_S: f64 = 20.0;
 const ROOM_FOR_MORE: f32 = 860.0;
 /// Room for the line before the numbers.
 const SEPARATOR: f32 = 24.0;
-/// Share of the limit from which on it is drawn.
+/// Fraction of the limit from which on it is drawn.
 const NEAR_LIMIT: f64 = 0.4;
 
-/// What is drawn of a response.
+/// Plotted parts of a response.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Shown {
     Displacement,
@@ -43,7 +43,7 @@ impl Shown {
         }
     }
 
-    /// Where the legend is in nobody's way.
+    /// Position of the legend away from the curves.
     fn corner(self) -> Corner {
         match self {
             Self::Displacement => Corner::RightBottom,
@@ -60,17 +60,17 @@ struct Response {
     /// In the shown unit.
     pitch: Vec<PlotPoint>,
     torque_nm: Vec<PlotPoint>,
-    /// What a reader would measure.
+    /// Key figures.
     summary: String,
     poles: Vec<SampledPole>,
 }
 
-/// Predictions for the design in force and for the other one.
+/// Predictions for the design active and for the other one.
 pub(super) struct Predicted {
     now: Response,
     other: Response,
     plane: PolePlane,
-    /// What the first plot shows where there is no room for more.
+    /// Signal of the first plot in a small window.
     first: Shown,
     /// Angles in degrees.
     degrees: bool,
@@ -89,7 +89,7 @@ impl Default for Predicted {
 }
 
 impl Predicted {
-    /// Poles of the design in force, of the loop as it runs.
+    /// Poles of the design active, of the sampled loop.
     pub(super) fn poles(&mut self, context: &ViewContext<'_>, trials: &Trials) -> &[SampledPole] {
         self.update(context, trials.shown());
         &self.now.poles
@@ -148,8 +148,8 @@ impl Predicted {
                 self.response_plot(context, *what, limit_nm, ui, size);
             }
             let size = vec2(ui.available_width(), ui.available_height());
-            // With an id of its own, or a drag would end where a plot before it gets more parts.
-            let scope = egui::UiBuilder::new().scope_id(egui::Id::unique("plane of poles"));
+            // With a separate id, or a drag would end where a plot before it gets more parts.
+            let scope = egui::UiBuilder::new().scope_id(egui::Id::unique("pole map"));
             ui.scope_builder(scope, |ui| {
                 self.plane.ui(context, (&self.now.poles, &self.other.poles), ui, size);
             });
@@ -161,17 +161,15 @@ impl Predicted {
         trials.choice_ui(ui);
         if !many {
             ui.separator();
-            let choices = [
-                (Shown::Displacement, "x", "Displacement in the first plot"),
-                (Shown::Pitch, "θ", "Pitch in the first plot"),
-            ];
+            let choices =
+                [(Shown::Displacement, "x", "Plot displacement"), (Shown::Pitch, "θ", "Plot pitch")];
             ui.scope(|ui| crate::widgets::choice_ui(ui, &mut self.first, &choices));
         }
         ui.separator();
         self.plane.choice_ui(ui);
     }
 
-    /// What the plots show, in words and numbers.
+    /// Range shown in the plots, in words and numbers.
     fn text(&self, context: &ViewContext<'_>, trials: &Trials) -> String {
         let (of, now) = (trials.shown_text(self.degrees), &self.now.summary);
         if self.other.summary.is_empty() {
@@ -251,7 +249,7 @@ impl Response {
 
 fn summary_ui(text: &str, ui: &mut Ui) {
     hint_ui(ui, text).on_hover_text(
-        "Linear, with the loop's tick, delay and held IMU; without noise, friction and torque limit",
+        "Linear sampled loop with delay and IMU sample-and-hold; without noise, friction and torque limit",
     );
 }
 
@@ -295,16 +293,16 @@ fn summary(response: &SampledResponse, disturbance: Disturbance, degrees: bool) 
         response.states.iter().fold(0.0, |peak: f64, state| peak.max(value(state).abs()))
     };
     let pitch = angle(largest(&|state| state.pitch_rad), degrees);
-    let peak = format!("{pitch} and {} N m at most", shown(response.peak_torque_nm(), 3));
+    let peak = format!("max. {pitch} and {} N m", shown(response.peak_torque_nm(), 3));
     let x_m = largest(&|state| state.x_m);
     // What counts as arrived: 2 % of the step, or of the farthest it was driven off.
     let band_m = 0.02 * if let Disturbance::Step(step) = disturbance { step.abs() } else { x_m };
     let last = response.states.iter().rposition(|state| state.x_m.abs() > band_m);
     match last {
         Some(last) if last + 1 == response.states.len() => {
-            format!("{peak}, not back after {} s", shown(last as f64 * response.tick_s, 2))
+            format!("{peak}, not settled after {} s", shown(last as f64 * response.tick_s, 2))
         }
-        Some(last) => format!("{peak}, back after {} s", shown((last + 1) as f64 * response.tick_s, 2)),
+        Some(last) => format!("{peak}, settled after {} s", shown((last + 1) as f64 * response.tick_s, 2)),
         None => peak,
     }
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use egui::{Grid, ProgressBar, RichText, Ui};
 use flqr_core::control::BalanceController;
 use flqr_core::lqr::{Disturbance, sampled_response};
-use flqr_core::model_file::RobotModel;
+use flqr_core::model::RobotModel;
 use flqr_core::simulate::{Recovery, largest_pitch, recovery};
 
 use super::verdict::Verdict;
@@ -19,10 +19,10 @@ use crate::widgets::{error_ui, hint_ui, mono, number_ui, section_ui, shown, warn
 
 /// The peak is looked for over this time, s.
 const PEAK_S: f64 = 3.0;
-/// Share of the limit up to which noise, friction and a second push have room.
+/// Fraction of the limit up to which noise, friction and a second push have room.
 const ROOMY: f64 = 0.8;
 
-/// What is said of a kind of disturbance.
+/// Labels of a kind of disturbance.
 struct Kind {
     name: &'static str,
     unit: Unit,
@@ -36,25 +36,20 @@ const KINDS: [Kind; 3] = [
         name: "kick",
         unit: Unit::Plain("N s"),
         largest: 1e4,
-        help: "A blow to the body's centre of mass: force times duration",
+        help: "Impulse at the body's centre of mass (force × duration)",
     },
-    Kind { name: "lean", unit: Unit::Angle, largest: 0.79, help: "The body is let go at this pitch" },
-    Kind {
-        name: "step",
-        unit: Unit::Plain("m"),
-        largest: 1e4,
-        help: "The place to stand at jumps this far ahead",
-    },
+    Kind { name: "lean", unit: Unit::Angle, largest: 0.79, help: "Initial pitch" },
+    Kind { name: "step", unit: Unit::Plain("m"), largest: 1e4, help: "Step of the position setpoint" },
 ];
 
-/// What the simulated robot does, with noise, friction and limits.
+/// Response of the simulated robot with noise, friction and limits.
 #[derive(Clone, Debug)]
 struct Simulated {
     recoveries: [Option<Recovery>; 3],
     largest_pitch_rad: Option<f64>,
 }
 
-/// What a simulation depends on.
+/// Inputs of a simulation.
 #[derive(Clone, Debug, PartialEq)]
 struct Question {
     robot: RobotModel,
@@ -62,7 +57,7 @@ struct Question {
     trials: [Disturbance; 3],
 }
 
-/// Peak torques of the design in force and of the other, N m.
+/// Peak torques of the design active and of the other, N m.
 #[derive(Clone, Copy)]
 struct Peaks {
     trials: [Disturbance; 3],
@@ -111,16 +106,16 @@ impl Trials {
         ui.scope(|ui| crate::widgets::choice_ui(ui, &mut self.shown, &choices));
     }
 
-    /// What it is, in words.
+    /// Description.
     pub(super) fn shown_text(&self, degrees: bool) -> String {
         match self.shown() {
             Disturbance::Kick(size) => format!("after a kick of {} N s", shown(size, 3)),
-            Disturbance::Pitch(size) => format!("let go at {}", angle(size, degrees)),
+            Disturbance::Pitch(size) => format!("released at {}", angle(size, degrees)),
             Disturbance::Step(size) => format!("after a step of {} m", shown(size, 3)),
         }
     }
 
-    /// Peak torques for the shown disturbance of the design in force and of the other one, N m.
+    /// Peak torques for the shown disturbance of the design active and of the other one, N m.
     pub(super) fn shown_peaks_nm(&mut self, context: &ViewContext<'_>) -> [f64; 2] {
         let shown = self.shown;
         self.peaks_nm(context).map(|peaks| peaks[shown])
@@ -148,7 +143,7 @@ impl Trials {
             let text = limit_nm
                 .map_or("no torque limit".to_owned(), |limit| format!("limit {} N m", shown(limit, 3)));
             hint_ui(ui, text).on_hover_text(
-                "Peak torque of one motor for each disturbance, linear with the loop's delay and without friction, against the motors' limit",
+                "Peak torque of one motor for each disturbance, compared with the torque limit; linear, including delay, without friction",
             );
         });
         let [peaks, _] = self.peaks_nm(context);
@@ -162,7 +157,7 @@ impl Trials {
             }
         });
         if limit_nm.is_none() {
-            hint_ui(ui, "Tick “torque limit” of the robot to see what the motors can hold.");
+            hint_ui(ui, "Enable “torque limit” of the robot to include the motor limit.");
         }
         self.sentences_ui(ui, &peaks, limit_nm);
         self.largest_ui(ui);
@@ -206,11 +201,11 @@ impl Trials {
             let Some(found) = answer.recoveries[index] else { continue };
             let beyond = limit_nm.is_some_and(|limit| peaks[index] > limit);
             if !found.upright {
-                let why = if beyond { "the motors cannot hold it" } else { "it does not get over it" };
+                let why = if beyond { "the motors saturate" } else { "it does not recover" };
                 error_ui(ui, format!("{}: the simulated robot falls, {why}.", kind.name));
             } else if beyond {
                 let time = shown(1e3 * found.at_limit_s, 2);
-                warning_ui(ui, format!("{}: at the limit for {time} ms, but it stays up.", kind.name));
+                warning_ui(ui, format!("{}: saturated for {time} ms, but recovers.", kind.name));
             }
         }
     }
@@ -218,14 +213,14 @@ impl Trials {
     fn largest_ui(&self, ui: &mut Ui) {
         let text = match (&self.answer, &self.job) {
             (Some(Simulated { largest_pitch_rad: Some(pitch), .. }), _) => {
-                format!("Gets up from a lean of {} at most.", angle(*pitch, degrees(ui.ctx())))
+                format!("Recovers from an initial tilt of up to {}.", angle(*pitch, degrees(ui.ctx())))
             }
-            (Some(_), _) => "The simulated robot did not take these values.".to_owned(),
-            (None, Some(_)) => "Trying it on the simulated robot…".to_owned(),
+            (Some(_), _) => "The simulation rejected these values.".to_owned(),
+            (None, Some(_)) => "Simulating…".to_owned(),
             (None, None) => return,
         };
         hint_ui(ui, text).on_hover_text(
-            "Largest pitch from which the simulated robot recovers, with its friction, noise, delay and limits; by bisection",
+            "Largest initial pitch from which the simulated robot recovers, with friction, noise, delay and limits",
         );
     }
 
@@ -266,7 +261,7 @@ impl Trials {
     }
 }
 
-/// Share of the limit as a bar, with the number on it.
+/// Fraction of the limit as a bar, with the number on it.
 fn peak_ui(ui: &mut Ui, peak_nm: f64, limit_nm: Option<f64>, verdict: Verdict) {
     let text = format!("{} N m", shown(peak_nm, 3));
     let Some(limit) = limit_nm else {
@@ -281,7 +276,7 @@ fn peak_ui(ui: &mut Ui, peak_nm: f64, limit_nm: Option<f64>, verdict: Verdict) {
         .corner_radius(3.0)
         .fill(color)
         .text(mono(format!("{text}  {:.0} %", 100.0 * share)).size(11.5));
-    ui.add(bar).on_hover_text("Peak torque of one motor, and its share of the limit");
+    ui.add(bar).on_hover_text("Peak torque of one motor, and fraction of the limit");
 }
 
 fn peak_nm(designed: &Designed, trial: Disturbance) -> f64 {
@@ -291,7 +286,7 @@ fn peak_nm(designed: &Designed, trial: Disturbance) -> f64 {
     if response.states.is_empty() { f64::NAN } else { response.peak_torque_nm() }
 }
 
-/// All trials and the largest pitch; none where it was cancelled.
+/// All trials and the largest pitch; `None` if it was cancelled.
 fn simulated(question: &Question, reporter: &Reporter<()>) -> Option<Simulated> {
     let Question { robot, controller, trials } = question;
     let mut watch =

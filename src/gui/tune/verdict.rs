@@ -1,4 +1,4 @@
-//! How good a number is: a mark, a colour and a word, so that no meaning hangs on the colour alone.
+//! Rating of a number: a mark, a colour and a word, so that no meaning hangs on the colour alone.
 
 use egui::{Color32, Rect, Sense, Shape, Stroke, Ui, WidgetInfo, accesskit::Role, vec2};
 

@@ -3,7 +3,7 @@
 use std::ops::RangeInclusive;
 
 use egui::{Button, Ui};
-use flqr_core::lqr::Weights;
+use flqr_core::model::Weights;
 
 use super::matrices::matrices_ui;
 use crate::command::Command;
@@ -13,7 +13,7 @@ use crate::plot::{Unit, UnitChoice};
 use crate::quantity::STATES;
 use crate::widgets::{choice_ui, hint_ui, number_ui, section_ui};
 
-/// What one weight is about.
+/// Description of one weight.
 struct Row {
     name: &'static str,
     /// Unit of the deviation.
@@ -60,7 +60,7 @@ impl Default for WeightEditor {
 impl WeightEditor {
     pub(super) fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
         section_ui(ui, "Weights", |ui| {
-            let help = "All weights as in the loaded model";
+            let help = "Reset all weights to the loaded model";
             let changed = context.session.weights() != context.saved.weights();
             let reset = ui.add_enabled(changed, Button::new("Reset").small());
             if reset.accessible_name("Reset weights").on_hover_text(help).clicked() {
@@ -74,13 +74,13 @@ impl WeightEditor {
         let mut weights = before;
         self.rows_ui(context, ui, &mut weights);
         ui.horizontal(|ui| {
-            ui.checkbox(&mut self.link_motors, "Same for both motors")
-                .on_hover_text("Both torques have the same weight, so both rows of K are equal");
+            ui.checkbox(&mut self.link_motors, "Same weight for both motors")
+                .on_hover_text("The same weight for both torques; both rows of K are equal");
             ui.checkbox(&mut self.full_matrices, "Full matrices")
-                .on_hover_text("Edit the entries off the diagonals too");
+                .on_hover_text("Also edit off-diagonal entries");
         });
         if !self.full_matrices && !before.is_diagonal() {
-            hint_ui(ui, "Entries off the diagonals follow these weights: see “Full matrices”.");
+            hint_ui(ui, "Off-diagonal entries scale with these weights, see “Full matrices”.");
         }
         if self.full_matrices {
             matrices_ui(ui, &mut weights);
@@ -96,8 +96,8 @@ impl WeightEditor {
             ui.label("");
             ui.label("");
             hint_ui(ui, "weight");
-            hint_ui(ui, "counts as 1").on_hover_text(
-                "Bryson's rule: the deviation whose square, times the weight, is 1. Choose the largest deviation that you accept, and the weight follows.",
+            hint_ui(ui, "max. deviation").on_hover_text(
+                "Bryson's rule: weight = 1 / (max. deviation)². Set the largest acceptable deviation.",
             );
             ui.end_row();
             for (index, row) in Q_ROWS.iter().enumerate() {
@@ -139,7 +139,10 @@ impl WeightEditor {
         let changed = *weight != saved;
         let reset = ui.add_enabled(changed, Button::new("↺").small().frame(false));
         let reset = reset.accessible_name(format!("reset {} weight", row.name));
-        if reset.on_hover_text(format!("Back to {}, as loaded", crate::widgets::plain(saved, 4))).clicked() {
+        if reset
+            .on_hover_text(format!("Reset to {} (loaded value)", crate::widgets::plain(saved, 4)))
+            .clicked()
+        {
             *weight = saved;
         }
         ui.end_row();
@@ -175,20 +178,20 @@ fn link(weights: &mut Weights, old: [f64; 2]) {
     }
 }
 
-/// The deviation that counts as 1, as another way to say the weight.
+/// The deviation that max. deviation, as another way to say the weight.
 fn deviation_ui(ui: &mut Ui, row: &Row, weight: &mut f64) {
     let (unit, scale) = row.unit.shown(UnitChoice::of(ui.ctx()));
     let before = scale / weight.sqrt();
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 3.0;
         if !before.is_finite() {
-            ui.weak("–").on_hover_text("A weight that is not above 0 has no such deviation");
+            ui.weak("–").on_hover_text("No max. deviation for a weight of 0 or below");
             return;
         }
         let mut deviation = before;
         let field = number_ui(ui, &mut deviation, &format!("{} deviation", row.name), 52.0);
         field.on_hover_text(format!(
-            "The deviation of {} that counts as 1: weight = 1/deviation², in SI units",
+            "Max. deviation of {} (Bryson's rule): weight = 1/deviation², in SI units",
             row.name
         ));
         ui.label(egui::RichText::new(unit).small());

@@ -7,17 +7,16 @@ use super::sign::{Rocking, Slope};
 use super::stage::{Check, CheckResult};
 use super::watch::Watch;
 use crate::link::MotorHealth;
-use crate::model_file::RobotModel;
-use crate::robot::Motor;
+use crate::model::{Motor, RobotModel};
 
-/// A motor or an IMU answers if it was heard within this time, s.
+/// A motor or an IMU answers if it was received within this time, s.
 const FRESH_S: f64 = 0.5;
 /// Time after which a command of another controller is forgotten, s: the longest time between two commands of one that
 /// does not drive the robot just now.
 const COMMANDED_S: f64 = 5.0;
-/// Time in which everybody is heard for the first time.
+/// Time in which everybody is received for the first time.
 const FIRST_ANSWERS: Duration = Duration::from_millis(300);
-/// Share of the IMU's rate that has to be there.
+/// Fraction of the IMU's rate that has to be there.
 const RATE_SHARE: f64 = 0.9;
 /// Largest pitch, rad, and pitch rate, rad/s, at which a robot is let go.
 const UPRIGHT_RAD: f64 = 0.15;
@@ -118,30 +117,30 @@ impl Checks {
             _ if !fresh && now < self.began + FIRST_ANSWERS => waiting(NAME, "listening".to_owned()),
             _ if !fresh => failed(
                 NAME,
-                "the IMU is silent: look at its cable, port and baud rate (115200 for 200 Hz)".to_owned(),
+                "the IMU is silent: check its cable, port and baud rate (115200 for 200 Hz)".to_owned(),
             ),
             None => waiting(NAME, "counting".to_owned()),
             Some(rate_hz) if rate_hz < RATE_SHARE * set_hz => failed(
                 NAME,
                 format!(
-                    "{rate_hz:.0} readings a second in place of {set_hz}: set the IMU's rate and baud rate, or \
-                     imu_rate_hz in [link]"
+                    "{rate_hz:.0} Hz instead of {set_hz} Hz: set the rate and baud rate of \
+                     the IMU, or imu_rate_hz in [link]"
                 ),
             ),
-            Some(rate_hz) => passed(NAME, format!("{rate_hz:.0} readings a second")),
+            Some(rate_hz) => passed(NAME, format!("{rate_hz:.0} Hz")),
         }
     }
 
     fn imu_alive(&self, now: Duration, watch: &Watch, robot: &RobotModel) -> Check {
         const NAME: &str = "IMU moves";
-        let Some(last) = watch.imu.last else { return waiting(NAME, "not heard yet".to_owned()) };
+        let Some(last) = watch.imu.last else { return waiting(NAME, "no data yet".to_owned()) };
         let frozen = watch.imu.frozen(now, &robot.safety, self.balancing);
         match frozen {
             Some(problem) if last.tilt_rad.is_some() => failed(NAME, problem.to_string()),
             // Without acceleration a quiet IMU may say the same again and again.
             Some(problem) => waiting(NAME, format!("{problem}, or move the robot")),
             None => watch.imu.inconsistent(&robot.safety).map_or_else(
-                || passed(NAME, "its readings change".to_owned()),
+                || passed(NAME, "its measurements change".to_owned()),
                 |problem| failed(NAME, problem.to_string()),
             ),
         }
@@ -159,13 +158,13 @@ impl Checks {
                 format!("pitch and the direction of gravity agree within {:.3} rad", apart.abs()),
             );
         }
-        let found = format!("gravity says {apart:.2} rad more than the pitch");
-        let mend = if apart.abs() > 2.0 {
-            "the IMU is mounted upside down, or its horizontal was never calibrated"
+        let found = format!("gravity and pitch differ by {apart:.2} rad");
+        let remedy = if apart.abs() > 2.0 {
+            "check whether the IMU is mounted upside down, and calibrate its horizontal"
         } else {
-            "choose the other pitch_axis in [link] if the IMU is mounted turned, or calibrate its horizontal"
+            "choose the other pitch_axis in [link] if the IMU is mounted rotated, or calibrate its horizontal"
         };
-        failed(NAME, format!("{found}: {mend}"))
+        failed(NAME, format!("{found}: {remedy}"))
     }
 
     /// Whether encoders and IMU count forward as the robot does.
@@ -173,11 +172,11 @@ impl Checks {
         const NAME: &str = "directions";
         use Slope::{EncoderScale, Reversed, Right, Unclear, Unknown};
         match self.slopes {
-            [Right, Right] => passed(NAME, "both motors turn back by as much as the body leans forward".to_owned()),
+            [Right, Right] => passed(NAME, "both motor angles decrease as the pitch increases".to_owned()),
             [Reversed, Reversed] => failed(
                 NAME,
-                "the IMU is mounted the other way round: turn pitch_direction in [link] over (or left_direction and \
-                 right_direction, if the pitch shown rises as the body leans forward)"
+                "the IMU is mounted in reverse: reverse pitch_direction in [link] (or left_direction and \
+                 right_direction, if the displayed pitch increases as the body leans forward)"
                     .to_owned(),
             ),
             [Reversed, _] => failed(NAME, reversed(Motor::Left)),
@@ -186,13 +185,13 @@ impl Checks {
             [_, EncoderScale(times)] => failed(NAME, wrong_steps(Motor::Right, times)),
             [Unclear, _] | [_, Unclear] => waiting(
                 NAME,
-                "motors and body do not turn by the same angle: keep the wheels on the ground, hold the robot so that \
-                 it does not roll, and rock its body slowly by 0.1 rad"
+                "motors and body do not turn by the same angle: keep the wheels on the ground \
+                 without rolling, and rock the body slowly by 0.1 rad"
                     .to_owned(),
             ),
             [Unknown, _] | [_, Unknown] => waiting(
                 NAME,
-                "rock the body slowly by 0.1 rad, wheels on the ground and not rolling".to_owned(),
+                "rock the body slowly by 0.1 rad, with the wheels on the ground and not rolling".to_owned(),
             ),
         }
     }
@@ -212,18 +211,18 @@ fn answers(now: Duration, watch: &Watch, motor: Motor, ids: [u8; 2]) -> Check {
         [true, true] => passed(name, format!("id {id} answers")),
         [false, false] if heard(other) == [false, false] => failed(
             name,
-            format!("id {id} is silent, and so is the other motor: look at supply, wiring and bit rate"),
+            format!("id {id} is silent, and so is the other motor: check supply, wiring and bit rate"),
         ),
         [false, false] => failed(
             name,
             format!(
-                "id {id} is silent while id {} answers: look at its cable, and at {key} in [link] (its blinking light \
-                 counts the id)",
+                "id {id} is silent while id {} answers: check its cable, and {key} in [link] \
+                 (its LED blinks the id)",
                 ids[other as usize]
             ),
         ),
-        [true, false] => waiting(name, format!("id {id} has not told voltage and errors yet")),
-        [false, true] => waiting(name, format!("id {id} has not told angle and speed yet")),
+        [true, false] => waiting(name, format!("id {id} has not reported voltage and errors yet")),
+        [false, true] => waiting(name, format!("id {id} has not reported angle and speed yet")),
     }
 }
 
@@ -238,7 +237,7 @@ fn nobody_else(now: Duration, watch: &Watch) -> Check {
                 "another controller on the bus commanded the motors {age_s:.1} s ago (0x{command:02X}): switch it off"
             ),
         ),
-        _ => passed(NAME, "nobody else commands the motors".to_owned()),
+        _ => passed(NAME, "no other controller commands the motors".to_owned()),
     }
 }
 
@@ -249,7 +248,7 @@ fn round_trip(watch: &Watch, robot: &RobotModel) -> Check {
         return waiting(NAME, "is measured".to_owned());
     };
     let (slowest_ms, limit_s) = (1e3 * left.max(right), robot.safety.round_trip_s);
-    let found = format!("three of four replies of the motors take at most {slowest_ms:.1} ms");
+    let found = format!("75 % of the replies of the motors take at most {slowest_ms:.1} ms");
     if left.max(right) <= limit_s {
         return passed(NAME, found);
     }
@@ -266,7 +265,7 @@ fn round_trip(watch: &Watch, robot: &RobotModel) -> Check {
 fn of_health(watch: &Watch, robot: &RobotModel) -> [Check; 3] {
     const NAMES: [&str; 3] = ["temperature", "voltage", "motor errors"];
     let [Some(left), Some(right)] = watch.motors.map(|motor| motor.health) else {
-        return NAMES.map(|name| waiting(name, "not told yet".to_owned()));
+        return NAMES.map(|name| waiting(name, "not reported yet".to_owned()));
     };
     let both = [left, right];
     let limits = &robot.safety;
@@ -288,7 +287,7 @@ fn voltage(name: &'static str, both: &[MotorHealth; 2], robot: &RobotModel) -> C
         Some(found) => failed(
             name,
             format!(
-                "{found:.1} V, not from {least} to {greatest} V: charge or check the battery; if the voltage is right, \
+                "{found:.1} V, outside {least} to {greatest} V: charge or check the battery; if the voltage is right, \
                  set state_layout in [link] or the limits in [safety]"
             ),
         ),
@@ -302,7 +301,7 @@ fn errors(name: &'static str, both: &[MotorHealth; 2]) -> Check {
         Some((motor, health)) => failed(
             name,
             format!(
-                "the {motor} motor reports {}: remove the cause, then switch it off and on",
+                "the {motor} motor reports {}: remove the cause, then power-cycle the motor",
                 health.errors
             ),
         ),
@@ -311,7 +310,7 @@ fn errors(name: &'static str, both: &[MotorHealth; 2]) -> Check {
 
 fn upright(watch: &Watch, robot: &RobotModel) -> Check {
     const NAME: &str = "upright";
-    let Some(imu) = watch.imu.last else { return waiting(NAME, "pitch not known yet".to_owned()) };
+    let Some(imu) = watch.imu.last else { return waiting(NAME, "pitch not available yet".to_owned()) };
     let allowed = UPRIGHT_RAD.min(0.5 * robot.safety.tilt_rad);
     if imu.pitch_rad.abs() > allowed || imu.pitch_rate_rad_s.abs() > CALM_RAD_S {
         let found = format!(
@@ -324,7 +323,7 @@ fn upright(watch: &Watch, robot: &RobotModel) -> Check {
 }
 
 fn reversed(motor: Motor) -> String {
-    format!("the {motor} motor counts backward: turn {motor}_direction in [link] over")
+    format!("the {motor} motor counts backward: reverse {motor}_direction in [link]")
 }
 
 fn wrong_steps(motor: Motor, times: f64) -> String {

@@ -6,7 +6,7 @@
 //!   (c₂ + c₃ + r (c₁ + c₅)) θ̈ = c₄ θ − r (c₁ + c₅) q̈. The motor speeds stand for the torque, so that neither the
 //!   friction nor the scale of the torque matters.
 //! - From the motors' reading to the new torque, which the model says is `torque_delay_s` later, the linear model
-//!   (Eq. 11) moves on under the torques that have been asked for already and have not acted yet, less the friction of
+//!   (Eq. 11) moves on under the torques that have been requested already and have not acted yet, less the friction of
 //!   the model, which holds a shaft that it can stop within a step; the turning robot goes on turning at its rate.
 //! - The mean of the motor speeds, read in steps of 1 deg/s, is smoothed by the same model: each tick it moves on under
 //!   the torques that act, and takes three tenths of what the reading says otherwise.
@@ -14,18 +14,18 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use crate::control::{Measurement, Odometry, Readings};
+use crate::control::{Measurement, Odometry};
 use crate::friction::Stribeck;
 use crate::link::{ImuReading, MotorState};
-use crate::model_file::RobotModel;
-use crate::robot::{Coefficients, TICK_S};
+use crate::model::{Coefficients, RobotModel, TICK_S};
+use crate::record::Readings;
 
 /// Torques and speeds that are remembered: more ticks than any delay that is bridged.
 const REMEMBERED: usize = 128;
 /// The longest way that is bridged, s; the linear model's fastest pole is not to take an error along by more than
 /// a half.
 const LONGEST_BRIDGE_S: f64 = 0.05;
-/// Share of a reading's surprise that the smoothed motor speed takes each tick.
+/// Fraction of a reading's surprise that the smoothed motor speed takes each tick.
 const SMOOTHING: f64 = 0.3;
 /// Time after which it begins anew, s.
 const LONGEST_GAP_S: f64 = 0.02;
@@ -46,7 +46,7 @@ pub(super) struct Estimator {
     origin_rad: Option<[f64; 2]>,
     /// Smoothed mean of the motor speeds over time, oldest first.
     speeds: VecDeque<(Duration, f64)>,
-    /// Torques and when they were asked for, oldest first.
+    /// Torques and when they were requested, oldest first.
     asked: VecDeque<(Duration, [f64; 2])>,
 }
 
@@ -93,7 +93,7 @@ impl Estimator {
         }
     }
 
-    /// The mean motor speed at a reading: what the model made of the one before, and a share of what was read.
+    /// The mean motor speed at a reading: what the model made of the one before, and a fraction of what was read.
     fn smoothed(&self, now: Duration, time: Duration, read: f64, speeds: [f64; 2]) -> f64 {
         let Some(&(last, before)) = self.speeds.back() else { return read };
         let dt_s = (time - last).as_secs_f64();
@@ -120,7 +120,7 @@ impl Estimator {
         }
     }
 
-    /// The newest reading of each sensor as it is; none before each has been heard.
+    /// The newest reading of each sensor as it is; none before each has been received.
     pub(super) fn readings(&self) -> Option<Readings> {
         let (_, motors) = self.heard()?;
         let (imu, [left, right]) = (self.imu?, self.origin_rad?);
@@ -138,7 +138,7 @@ impl Estimator {
         self.odometry.measurement(readings)
     }
 
-    /// What the readings will say when a torque that is asked for `now` acts.
+    /// What the readings will say when a torque that is requested `now` acts.
     pub(super) fn at_action(&self, now: Duration, readings: &Readings) -> Measurement {
         let Some(((heard, _), imu)) = self.heard().zip(self.imu) else { return self.held(readings) };
         let pitch = self.pitch_with_motors(&imu, heard, readings);
@@ -200,7 +200,7 @@ impl Estimator {
         }
     }
 
-    /// The linear model from the motors' reading on for `way_s`, up to where a torque that is asked for `now` acts.
+    /// The linear model from the motors' reading on for `way_s`, up to where a torque that is requested `now` acts.
     fn moved_on(&self, now: Duration, way_s: f64, readings: &Readings, mut pitch: Pitch) -> Measurement {
         let mut readings = *readings;
         for step in 0..(way_s / TICK_S).round() as u32 {
@@ -243,7 +243,7 @@ impl Estimator {
             self.friction[motor].map_or([0.0; 2], |curve| {
                 let p = curve.parameters();
                 let smooth = p.offset_nm + p.viscous_nm_s_rad * speed;
-                [curve.level_nm(speed), smooth]
+                [curve.amplitude_nm(speed), smooth]
             })
         };
         let [left, right] = speeds;
@@ -260,7 +260,7 @@ impl Estimator {
         (stopping_nm - smooth).clamp(-most, most) + smooth
     }
 
-    /// Torques that act `left_s` before one that is asked for `now` does, N m.
+    /// Torques that act `left_s` before one that is requested `now` does, N m.
     fn acting(&self, now: Duration, left_s: f64) -> [f64; 2] {
         // Half a tick of room for ticks that come a little early or late.
         let before = now.saturating_sub(Duration::from_secs_f64((left_s - 0.5 * TICK_S).max(0.0)));

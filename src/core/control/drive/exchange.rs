@@ -16,7 +16,7 @@ pub struct DriveSettings {
     /// Whether readings are brought to the time at which the new torque will act (`estimate.rs`). Without, the
     /// controller gets each sensor's newest reading as it is, as in [`crate::simulate`]. Default: true.
     pub latency_compensation: bool,
-    /// Whether the robot is stopped where the motors clearly do more or less than they are asked for.
+    /// Whether the robot is stopped where the motors clearly do more or less than they are requested.
     /// Default: true.
     pub torque_scale_check: bool,
 }
@@ -30,21 +30,21 @@ impl Default for DriveSettings {
 /// A robot that cannot be driven.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum DriveError {
-    /// Torques cannot be told as currents.
+    /// Torques cannot be determined as currents.
     #[error(
-        "the robot can be watched but not driven: set torque_constant_nm_a in [link], 0.32 N m/A of the MF9025v2-16T \
+        "the robot can be monitored but not driven: set torque_constant_nm_a in [link], 0.32 N m/A of the MF9025v2-16T \
          or 0.81 N m/A of the -35T"
     )]
     NoTorqueConstant,
     /// Torques without bound.
     #[error(
-        "the robot can be watched but not driven: set torque_nm in [limits], the largest torque of one motor"
+        "the robot can be monitored but not driven: set torque_nm in [limits], the largest torque of one motor"
     )]
     NoTorqueLimit,
     /// A limit that the current command cannot express.
     #[error(
-        "torque_nm = {limit_nm} in [limits] is above {greatest_nm:.2} N m, the most that 2048 steps of the current \
-         command ask for: lower it, or check torque_constant_nm_a and current_steps_per_a in [link]"
+        "torque_nm = {limit_nm} in [limits] is above {greatest_nm:.2} N m, the largest torque of the current \
+         command (2048 steps): lower it, or check torque_constant_nm_a and current_steps_per_a in [link]"
     )]
     TorqueLimit {
         /// Of the model, N m.
@@ -53,10 +53,10 @@ pub enum DriveError {
         greatest_nm: f64,
     },
     /// Gains that must not drive the robot.
-    #[error("the robot can be watched but not driven: {0}")]
+    #[error("the robot can be monitored but not driven: {0}")]
     Gains(#[from] Refusal),
     /// A sweep whose dwells are too short.
-    #[error("{seconds} s are too short for the speeds of a sweep: give at least {least} s")]
+    #[error("{seconds} s is too short for the speeds of a sweep: give at least {least} s")]
     SweepTooShort {
         /// Asked for, s.
         seconds: f64,
@@ -68,12 +68,12 @@ pub enum DriveError {
     Parameter(#[from] ParameterError),
 }
 
-/// What was heard since the last step.
+/// What was received since the last step.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Inputs<'a> {
-    /// From the motors, in the order in which it was heard.
+    /// From the motors, in the order in which it was received.
     pub motors: &'a [MotorEvent],
-    /// From the IMU, in the order in which it was heard.
+    /// From the IMU, in the order in which it was received.
     pub imu: &'a [ImuReading],
     /// From whoever drives.
     pub orders: &'a [DriveOrder],
@@ -88,7 +88,7 @@ pub struct Inputs<'a> {
 pub struct Output {
     /// To be sent now, in this order.
     pub orders: Orders,
-    /// Row of the robot log, at every step of checking and driving, once every sensor has been heard.
+    /// Row of the robot log, at every step of checking and driving, once every sensor has been received.
     pub sample: Option<Sample>,
     /// Row of both motors' bench logs, at every driven step with the wheels in the air.
     pub bench: Option<BenchSample>,
@@ -136,7 +136,7 @@ impl fmt::Debug for Orders {
 pub enum DriveEvent {
     /// Another stage has been reached; in [`Stage::Stopped`] with the reason.
     Stage(Stage),
-    /// Something that was asked for was done.
+    /// Something that was requested was done.
     Note(&'static str),
     /// Something was refused or is not as it should be.
     Warning(String),

@@ -2,13 +2,13 @@
 
 use crate::control::{BalanceController, Measurement, Reference};
 
-/// Ticks over which new gains fade in: 0.2 s, long compared with the slew of a motor and short compared with the time in
-/// which a robot drives off.
+/// Ticks over which new gains fade in: 0.2 s, long compared with the slew of a motor and short compared with the time
+/// in which a robot drives off.
 pub(super) const HANDOVER_TICKS: u32 = 200;
 
 /// The controller in charge, and how far it has taken over.
 ///
-/// Both controllers see the same measurement; the share of the new one grows from 0 to 1 along a straight line.
+/// Both controllers see the same measurement; the fraction of the new one grows from 0 to 1 along a straight line.
 /// Unlike a difference that is kept and faded out, the mean of both answers a push during the handover. A controller
 /// that comes meanwhile waits for its end; of several the last one counts.
 #[derive(Clone, Debug)]
@@ -24,7 +24,8 @@ impl Handover {
         Self { current: controller, before: None, waiting: None }
     }
 
-    /// Gives a new controller the parts that hold from connection to disconnection: torque limit, yaw hold and odometry.
+    /// Gives a new controller the parts that hold from connection to disconnection: torque limit, yaw hold and
+    /// odometry.
     pub(super) fn complete(&self, new: BalanceController) -> BalanceController {
         let BalanceController { torque_limit_nm, yaw_hold, odometry, .. } = self.current;
         BalanceController { torque_limit_nm, yaw_hold, odometry, ..new.without_rotor_angle() }
@@ -68,8 +69,8 @@ impl Handover {
 mod tests {
     use super::*;
     use crate::control::ControllerKind;
+    use crate::model::State;
     use crate::model_file::presets;
-    use crate::robot::State;
     use nalgebra::Matrix2x4;
 
     /// The torque at a pitch of 0.1 rad goes in a straight line from the old gain's to the new one's, within 0.2 s.

@@ -6,7 +6,7 @@ use std::time::Duration;
 use super::stage::{ImuValue, StopReason};
 use super::watch::age_s;
 use crate::link::ImuReading;
-use crate::robot::{SafetyLimits, State};
+use crate::model::{SafetyLimits, State};
 
 /// Equal readings in a row from which on an IMU may be frozen: at a low rate two or three may be equal by chance.
 const LEAST_EQUAL_READINGS: u32 = 5;
@@ -24,11 +24,11 @@ const LONGEST_GAP_S: f64 = 0.1;
 /// Readings in a row that have to disagree: a single one may be damaged.
 const DISAGREEING: u32 = 2;
 
-/// What was heard of the IMU, and when.
+/// What was received of the IMU, and when.
 ///
 /// It is frozen where pitch, pitch rate and the direction of acceleration stay the same to the last bit, at five
 /// readings in a row and for longer than `imu_frozen_s`. Angles and rates of a quiet IMU do repeat (a JY901 takes its
-/// rate as 0 at rest); its accelerations, whose noise of about 1 mg is 2 steps, never all stand still. So without
+/// rate as 0 at standstill); its accelerations, whose noise of about 1 mg is 2 steps, never all stand still. So without
 /// acceleration it can only be told of a robot that moves: one that balances, not one with its wheels in the air.
 ///
 /// Pitch and pitch rate are independent readings of one motion: the change of the pitch less the integrated rate,
@@ -43,8 +43,17 @@ pub(super) struct ImuWatch {
     /// Change of the pitch less the integrated rate, rad, and for how many readings it has been too large.
     mismatch_rad: f64,
     disagreeing: u32,
-    /// Readings with the same pitch, or the same rate, and by how much the other value turned meanwhile, rad.
-    stuck: [(u32, f64); 2],
+    /// Of the pitch, and of the pitch rate.
+    stuck: [Stuck; 2],
+}
+
+/// Equal readings of one value, and the rotation that the other value shows meanwhile.
+#[derive(Clone, Copy, Debug, Default)]
+struct Stuck {
+    repeats: u32,
+    rotation_rad: f64,
+    /// Largest magnitude of the rotation: a body that is rocked comes back to where it was.
+    largest_rad: f64,
 }
 
 impl ImuWatch {
@@ -55,7 +64,7 @@ impl ImuWatch {
             heard: VecDeque::with_capacity(256),
             mismatch_rad: 0.0,
             disagreeing: 0,
-            stuck: [(1, 0.0); 2],
+            stuck: [Stuck::default(); 2],
         }
     }
 
@@ -85,7 +94,7 @@ impl ImuWatch {
     fn compare(&mut self, last: &ImuReading, reading: &ImuReading, limits: &SafetyLimits) {
         let dt_s = age_s(reading.time, last.time);
         if dt_s > LONGEST_GAP_S {
-            (self.mismatch_rad, self.disagreeing, self.stuck) = (0.0, 0, [(1, 0.0); 2]);
+            (self.mismatch_rad, self.disagreeing, self.stuck) = (0.0, 0, [Stuck::default(); 2]);
             return;
         }
         let change = near_zero(reading.pitch_rad - last.pitch_rad);
@@ -95,7 +104,7 @@ impl ImuWatch {
         self.disagreeing = if disagrees { self.disagreeing + 1 } else { 0 };
         let same = [reading.pitch_rad == last.pitch_rad, reading.pitch_rate_rad_s == last.pitch_rate_rad_s];
         for (stuck, same) in self.stuck.iter_mut().zip(same) {
-            *stuck = if same { (stuck.0 + 1, stuck.1 + change - turned) } else { (1, 0.0) };
+            *stuck = if same { stuck.longer(change - turned) } else { Stuck::default() };
         }
     }
 
@@ -123,17 +132,24 @@ impl ImuWatch {
 
     /// Pitch and pitch rate that contradict each other.
     pub(super) fn inconsistent(&self, limits: &SafetyLimits) -> Option<StopReason> {
-        let stuck = [ImuValue::Pitch, ImuValue::PitchRate].into_iter().zip(self.stuck).find_map(
-            |(value, (count, turned_rad))| {
-                let too_far = turned_rad.abs() > STUCK_FRACTION * limits.pitch_mismatch_rad;
-                (count >= LEAST_EQUAL_READINGS && too_far)
-                    .then_some(StopReason::ImuStuck { value, turned_rad: turned_rad.abs() })
-            },
-        );
+        let stuck =
+            [ImuValue::Pitch, ImuValue::PitchRate].into_iter().zip(self.stuck).find_map(|(value, stuck)| {
+                let too_far = stuck.largest_rad > STUCK_FRACTION * limits.pitch_mismatch_rad;
+                (stuck.repeats + 1 >= LEAST_EQUAL_READINGS && too_far)
+                    .then_some(StopReason::ImuStuck { value, turned_rad: stuck.largest_rad })
+            });
         let mismatch_rad = self.mismatch_rad;
         stuck.or_else(|| {
             (self.disagreeing >= DISAGREEING).then_some(StopReason::PitchMismatch { mismatch_rad })
         })
+    }
+}
+
+impl Stuck {
+    /// Same with one more equal reading.
+    fn longer(self, rotation_rad: f64) -> Self {
+        let sum = self.rotation_rad + rotation_rad;
+        Self { repeats: self.repeats + 1, rotation_rad: sum, largest_rad: self.largest_rad.max(sum.abs()) }
     }
 }
 

@@ -6,18 +6,17 @@ use super::estimate::Estimator;
 use super::exchange::Inputs;
 use super::watch::Watch;
 use crate::link::{ImuReading, MotorEvent};
-use crate::model_file::RobotModel;
+use crate::model::{RobotModel, SafetyLimits};
 use crate::record::Sample;
-use crate::robot::SafetyLimits;
 
-/// Time after which a sensor that was heard is silent and samples are left out.
+/// Time after which a sensor that was received is silent and samples are left out.
 const SILENT: Duration = Duration::from_millis(50);
 
-/// Makes samples of what is heard, at most one a millisecond, from when both motors have been heard.
+/// Makes samples of what is received, at most one a millisecond, from when both motors have been received.
 ///
 /// - Sensors are held between readings. While no reading of an IMU has ever come, pitch and its rate are taken as 0.
-/// - Nothing is given while a sensor that was heard has been silent for 0.05 s.
-/// - The torque is the one that another controller last asked for, if that was heard within 0.05 s, otherwise that of
+/// - Nothing is given while a sensor that was received has been silent for 0.05 s.
+/// - The torque is the one that another controller last requested, if that was received within 0.05 s, otherwise that of
 ///   the measured current; both by the torque constant of `[link]`, and 0 without one.
 /// - Way, heading and motor angles count from the first sample.
 #[derive(Clone, Debug)]
@@ -32,7 +31,7 @@ pub struct Listener {
 }
 
 impl Listener {
-    /// Before anything is heard.
+    /// Before anything is received.
     pub fn new(robot: &RobotModel) -> Self {
         Self {
             torque_constant_nm_a: robot.link.torque_constant_nm_a.unwrap_or(0.0),
@@ -44,7 +43,7 @@ impl Listener {
         }
     }
 
-    /// Takes what was heard since the last call, and gives a sample where something new is there in a
+    /// Takes what was received since the last call, and gives a sample where something new is there in a
     /// millisecond that has none yet.
     pub fn hear(&mut self, now: Duration, motors: &[MotorEvent], imu: &[ImuReading]) -> Option<Sample> {
         self.watch.hear(&Inputs { motors, imu, ..Inputs::default() }, &self.limits);

@@ -1,20 +1,20 @@
-//! A real robot under control: from what was heard to what is asked of the motors, in stages, within limits,
-//! under watchdogs. Pure: time and all that was heard are arguments.
+//! Control of a real robot, from received data to motor orders, in stages, within limits and under watchdogs. Pure: time
+//! and received data are arguments.
 //!
 //! One [`Drive::step`] a millisecond, in every stage:
 //! - [`Stage::Listening`]: no order to the motors. [`Listener`] makes samples of what others make the robot do.
-//! - [`Stage::Checking`]: the motors are asked for their state at 200 Hz and their health at 22 Hz, and [`Check`]s say
-//!   what is right, what is to be done, and what is wrong with its mend.
+//! - [`Stage::Checking`]: the state of the motors is queried at 200 Hz and their health at 22 Hz. [`Check`]s report what
+//!   is right, what remains to be done, and what is wrong with its remedy.
 //! - [`Stage::Driving`]: motors on, torques at 1 kHz, which the motors answer with their state, and health at 22 Hz.
-//!   Every watch and limit of `[safety]` is looked at before a torque is commanded. The torque limit rises from 0 within
-//!   0.2 s of arming. Small torques then show whether the motors turn the right way (`torque_sign.rs`) and by the right
-//!   amount (`torque_scale.rs`).
+//!   Every watch and limit of `[safety]` is evaluated before a torque is commanded. The torque limit rises from 0 within
+//!   0.2 s of arming. Small torques then show whether the motors turn in the right direction (`torque_sign.rs`) and by
+//!   the right amount (`torque_scale.rs`).
 //! - [`Stage::Stopped`]: no torque and motors off in the same step, repeated every 5 ms until both have said that they
 //!   are off; then nothing. A stop before arming sends nothing: the motors were not switched on here. With
 //!   `stop = "zero_then_off"` the motors roll out without torque before they are switched off.
 //!
 //! Torques stay within `torque_nm` and change by `torque_slew_nm_s` at most, both of `[limits]`; only the stop is not
-//! slewed. Way, heading and motor angles count from where the robot was armed, motor angles such that
+//! slewed. Distance, heading and motor angles count from where the robot was armed, motor angles such that
 //! x = r (q + θ) = 0 there; while checking, from the first reading. So the rotors' own angles are not known, and
 //! effects that depend on them, as cogging, are not fed forward.
 
@@ -43,9 +43,8 @@ use std::time::Duration;
 
 use crate::control::{BalanceController, Reference, gate};
 use crate::link::MotorOrder;
-use crate::model_file::RobotModel;
+use crate::model::{Motor, RobotModel, State, StopAction, TICK_S};
 use crate::record::{BenchSample, Sample};
-use crate::robot::{Motor, State, StopAction, TICK_S};
 use checks::Checks;
 use estimate::Estimator;
 use imu_watch::GravityWatch;
@@ -55,8 +54,8 @@ use switching::Switching;
 use watch::Watch;
 use wheel_watch::WheelWatch;
 
-/// Times between two queries of the motors' health, in turn: with unequal ones a reply that is later than the next query
-/// shows in the round trip.
+/// Times between two queries of the motors' health, in turn: with unequal ones a reply that is later than the next
+/// query shows in the round trip.
 const HEALTH_PERIODS: [Duration; 2] = [Duration::from_millis(30), Duration::from_millis(60)];
 /// Time between two queries of the motors' state where no torque is commanded.
 const STATE_PERIOD: Duration = Duration::from_millis(5);
@@ -72,9 +71,8 @@ const RAMP_S: f64 = 0.2;
 const SLOW_RAD_S: f64 = 1.0;
 const FRESH: Duration = Duration::from_millis(20);
 /// What the LK protocol cannot tell (versions 2.35 and 2.36 have no such parameter).
-const NO_TIMEOUT: &str = "the motors' own time-out cannot be read with the LK protocol: if this computer, the adapter or a \
-    cable fails, they keep their last torque. Set the time-out in the motors with the maker's tool, and keep the switch of \
-    their supply within reach";
+const NO_TIMEOUT: &str = "the timeout of the motors cannot be read with the LK protocol: if this computer, the adapter \
+    or a cable fails, they hold their last torque. Set the timeout with the manufacturer's tool, and keep the switch of their supply within reach";
 
 /// A robot that is driven, or may be.
 #[derive(Clone, Debug)]
@@ -167,7 +165,7 @@ impl Drive {
         self.stage == Stage::Listening || matches!(self.stage, Stage::Stopped(_)) && self.switching.is_none()
     }
 
-    /// Largest torque that is asked of a motor, N m.
+    /// Largest torque that is required of a motor, N m.
     pub fn torque_limit_nm(&self) -> f64 {
         self.torque_limit_nm
     }
@@ -196,7 +194,7 @@ impl Drive {
     fn obey(&mut self, now: Duration, order: &DriveOrder, output: &mut Output) {
         match (order, self.stage) {
             (DriveOrder::Stop | DriveOrder::Finish, Stage::Stopped(_)) => {}
-            (DriveOrder::Stop, _) => self.stop(now, StopReason::Asked, output),
+            (DriveOrder::Stop, _) => self.stop(now, StopReason::Requested, output),
             (DriveOrder::Finish, _) => self.stop(now, StopReason::TimeOver, output),
             (DriveOrder::Check, Stage::Listening) => self.begin_checks(now, output),
             (DriveOrder::Arm, Stage::Checking) => self.arm(now, output),
@@ -207,7 +205,7 @@ impl Drive {
             }
             (DriveOrder::Reference(reference), _) => self.refer_to(reference, output),
             (DriveOrder::Check, _) => refuse(output, "to check the robot, release it first"),
-            (DriveOrder::Arm, _) => refuse(output, "to arm the robot, let it be checked first"),
+            (DriveOrder::Arm, _) => refuse(output, "to arm the robot, run the checks first"),
             (DriveOrder::Release, Stage::Driving) => refuse(output, "to release the robot, stop it first"),
         }
     }
@@ -215,7 +213,7 @@ impl Drive {
     fn begin_checks(&mut self, now: Duration, output: &mut Output) {
         if self.loses_effects {
             let text =
-                "effects that depend on the rotors' own angles are not fed forward: angles count from arming";
+                "effects that depend on the rotor angles are not compensated: angles are relative to arming";
             output.events.push(DriveEvent::Warning(text.to_owned()));
         }
         output.events.extend(self.robot.safety.unsafe_limits().into_iter().map(DriveEvent::Warning));
@@ -249,7 +247,7 @@ impl Drive {
     fn release(&mut self, output: &mut Output) {
         if let Some(motor) = self.switching.as_ref().and_then(Switching::missing) {
             let text = format!(
-                "not released, because the {motor} motor has not said that it is off: switch its supply off, or disconnect"
+                "not released, because the {motor} motor has not confirmed that it is off: switch its supply off, or disconnect"
             );
             output.events.push(DriveEvent::Warning(text));
             return;
@@ -259,11 +257,15 @@ impl Drive {
 
     fn take_over(&mut self, controller: BalanceController, stage: Stage, output: &mut Output) {
         let Program::Balance { controller: handover, .. } = &mut self.program else {
-            return refuse(output, "wheels in the air are under speed control and take no other controller");
+            return refuse(
+                output,
+                "with the wheels in the air, speed control is active and no other controller is accepted",
+            );
         };
         let controller = handover.complete(controller);
         if let Err(refusal) = gate::check(&self.robot, &controller) {
-            let text = format!("the new gains are not applied and the previous ones stay: {refusal}");
+            let text =
+                format!("the new gains are not applied and the previous ones remain active: {refusal}");
             return refuse(output, &text);
         }
         handover.hand_over(controller);
@@ -280,7 +282,7 @@ impl Drive {
         if finite && x_m.abs() <= self.robot.safety.distance_m {
             self.reference = *reference;
         } else {
-            refuse(output, "a reference that is no number or beyond distance_m in [safety] is not taken");
+            refuse(output, "a setpoint that is not finite or beyond distance_m in [safety] is rejected");
         }
     }
 

@@ -1,4 +1,4 @@
-//! What the motors are asked for once armed.
+//! What the motors are requested once armed.
 
 use super::exchange::DriveError;
 use super::handover::Handover;
@@ -6,8 +6,8 @@ use super::stage::Excitation;
 use crate::control::{
     BalanceController, Measurement, Reference, SpeedGains, SpeedPi, SpeedProgram, SpeedRun,
 };
-use crate::identify::excitation::{BALANCE_MULTISINE_NM, Multisine, SpeedSweep, multisines};
-use crate::model_file::RobotModel;
+use crate::excitation::{BALANCE_MULTISINE_NM, Multisine, SpeedSweep, multisines};
+use crate::model::RobotModel;
 
 /// Time for which the robot balances before torques are put on top, s.
 const SETTLE_S: f64 = 3.0;
@@ -17,7 +17,7 @@ const SETTLE_S: f64 = 3.0;
 pub(super) enum Program {
     /// On the ground.
     Balance { controller: Box<Handover>, added: Option<[Multisine; 2]>, torque_limit_nm: f64 },
-    /// Wheels in the air, s in all; as it starts, and as it runs.
+    /// Wheels in the air, s in all; as it starts, and when sampled.
     Air { fresh: Box<SpeedRun>, running: Box<SpeedRun>, seconds: f64 },
 }
 

@@ -12,7 +12,7 @@ pub(super) struct Solution<const N: usize> {
     pub(super) residual: f64,
 }
 
-/// Solves for the unknowns of rows (regressors, y); none where they are not independent. Each column is scaled by its
+/// Solves for the unknowns of rows (regressors, y); `None` if they are not independent. Each column is scaled by its
 /// norm first, so that regressors may have any size.
 pub(super) fn least_squares<const N: usize>(
     rows: impl Iterator<Item = ([f64; N], f64)> + Clone,

@@ -3,8 +3,8 @@
 use super::stage::StopReason;
 use super::torque_scale::{TorqueScale, Verdict};
 use super::torque_sign::TorqueSign;
-use crate::control::Readings;
-use crate::model_file::RobotModel;
+use crate::model::RobotModel;
+use crate::record::Readings;
 
 /// Both tests, one after the other.
 #[derive(Clone, Debug)]
@@ -48,12 +48,12 @@ impl SelfTest {
         (readings, age_s): (&Readings, f64),
         acted_nm: [f64; 2],
     ) -> Option<Finding> {
-        let reversed = self.sign.step(time_s, readings, acted_nm).map(Finding::Stop);
+        let reversed = self.sign.step(time_s, (readings, age_s), acted_nm).map(Finding::Stop);
         reversed.or_else(|| match self.scale.step(time_s, (readings, age_s), acted_nm)? {
             Verdict::Wrong(reason) => Some(Finding::Stop(reason)),
             Verdict::Unclear => Some(Finding::Warning(
-                "whether the motors do what they are asked for is not clear from the nudges: check \
-                 torque_constant_nm_a and current_steps_per_a in [link] yourself",
+                "the torque scale could not be verified by the self-test: check \
+                 torque_constant_nm_a and current_steps_per_a in [link]",
             )),
             Verdict::Right => None,
         })

@@ -4,7 +4,7 @@ use std::fmt;
 
 use crate::control::{BalanceController, Reference};
 use crate::link::MotorErrors;
-use crate::robot::Motor;
+use crate::model::Motor;
 
 /// How far a robot is from being driven. From each stage only the next one can be reached, and `Stopped` from
 /// all.
@@ -12,7 +12,7 @@ use crate::robot::Motor;
 pub enum Stage {
     /// Nothing is sent.
     Listening,
-    /// Motors are asked for readings, without torque, and all that has to be right is checked.
+    /// Motors are requested readings, without torque, and all that has to be right is checked.
     Checking,
     /// The motors are on and follow the controller.
     Driving,
@@ -32,7 +32,7 @@ impl Stage {
     }
 }
 
-/// What is asked of the drive.
+/// What is required of the drive.
 #[derive(Clone, Debug, PartialEq)]
 pub enum DriveOrder {
     /// First step of arming: from listening to checking.
@@ -73,34 +73,34 @@ pub enum Excitation {
 /// Why a robot was stopped.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum StopReason {
-    /// Somebody asked for it.
+    /// Somebody requested it.
     #[error("stop command from the operator")]
-    Asked,
+    Requested,
     /// The time that was given is over.
-    #[error("the time is over")]
+    #[error("the time has elapsed")]
     TimeOver,
     /// The excitation has come to its end.
     #[error("the experiment is done")]
     Done,
     /// No reading of the IMU.
     #[error(
-        "the IMU has been silent for {silent_s:.3} s: look at its cable, rate and baud rate, or at what else keeps this \
-         computer busy"
+        "the IMU has been silent for {silent_s:.3} s: check its cable, rate and baud rate, and the load \
+         of this computer"
     )]
     ImuSilent {
         /// For how long, s.
         silent_s: f64,
     },
     /// The same reading again and again.
-    #[error("the IMU has sent the very same reading for {frozen_s:.3} s: switch it off and on")]
+    #[error("the IMU has sent the same measurement for {frozen_s:.3} s: power-cycle it")]
     ImuFrozen {
         /// For how long, s.
         frozen_s: f64,
     },
     /// No reply of a motor.
     #[error(
-        "the {motor} motor has been silent for {silent_s:.3} s: look at its cable, supply and id, or at what else keeps \
-         this computer busy"
+        "the {motor} motor has been silent for {silent_s:.3} s: check its cable, supply and id, and the \
+         load of this computer"
     )]
     MotorSilent {
         /// Which.
@@ -110,7 +110,7 @@ pub enum StopReason {
     },
     /// No voltage and errors of a motor that still tells its motion.
     #[error(
-        "the {motor} motor has told neither voltage nor errors for {silent_s:.1} s: look at its firmware and the bus load"
+        "the {motor} motor has reported neither voltage nor errors for {silent_s:.1} s: check its firmware and the bus load"
     )]
     HealthSilent {
         /// Which.
@@ -120,8 +120,8 @@ pub enum StopReason {
     },
     /// A silence over which a motor may have turned by any number of turns.
     #[error(
-        "the {motor} motor was silent for so long that its turns are not known: set motor_timeout_s in [safety] to at \
-         most 0.06"
+        "the {motor} motor was silent for so long that its number of turns is unknown: set motor_timeout_s in [safety] \
+         to at most 0.06"
     )]
     TurnsLost {
         /// Which.
@@ -147,7 +147,7 @@ pub enum StopReason {
     },
     /// A motor is off that is to be on.
     #[error(
-        "the {motor} motor is off: it has switched itself off, or has never taken the order to switch on"
+        "the {motor} motor is off: it has switched itself off, or has not accepted the command to switch on"
     )]
     MotorOff {
         /// Which.
@@ -174,7 +174,7 @@ pub enum StopReason {
         pitch_rad: f64,
     },
     /// Too fast.
-    #[error("the robot drives at {x_dot_m_s:.2} m/s")]
+    #[error("the robot moves at {x_dot_m_s:.2} m/s")]
     Speed {
         /// Speed, m/s.
         x_dot_m_s: f64,
@@ -209,8 +209,8 @@ pub enum StopReason {
     },
     /// Pitch or pitch rate stands still while the other one moves.
     #[error(
-        "the IMU's {value} has not changed while the {} moved by {turned_rad:.3} rad: switch the IMU off and on, and \
-         check its settings",
+        "the {value} of the IMU has not changed while the {} moved by {turned_rad:.3} rad: power-cycle the \
+         IMU and check its settings",
         value.other()
     )]
     ImuStuck {
@@ -221,7 +221,7 @@ pub enum StopReason {
     },
     /// Pitch and pitch rate contradict each other.
     #[error(
-        "the IMU's pitch changed by {mismatch_rad:.3} rad more than its pitch rate says: check the IMU, its calibration \
+        "the pitch of the IMU and its integrated pitch rate differ by {mismatch_rad:.3} rad: check the IMU, its calibration \
          and its mounting"
     )]
     PitchMismatch {
@@ -230,7 +230,7 @@ pub enum StopReason {
     },
     /// Pitch and gravity contradict each other.
     #[error(
-        "gravity says {mismatch_rad:.3} rad more than the IMU's pitch: check the IMU, its calibration and its mounting"
+        "gravity and the pitch of the IMU differ by {mismatch_rad:.3} rad: check the IMU, its calibration and its mounting"
     )]
     GravityMismatch {
         /// Direction of gravity less the pitch, rad.
@@ -238,8 +238,8 @@ pub enum StopReason {
     },
     /// A motor's torque must have moved its shaft, and the encoder does not show it.
     #[error(
-        "the {motor} encoder stands still although the torque must have changed the motor's speed by {missed_rad_s:.1} \
-         rad/s: check the encoder, and that the motor gives torque"
+        "the {motor} encoder does not change although the torque should have changed the motor speed by {missed_rad_s:.1} \
+         rad/s: check the encoder and the torque of the motor"
     )]
     EncoderFrozen {
         /// Which.
@@ -248,11 +248,11 @@ pub enum StopReason {
         missed_rad_s: f64,
     },
     /// The body swings, and neither encoder shows it.
-    #[error("both encoders stand still although the body swings back and forth: check the encoders")]
+    #[error("both encoders do not change although the body swings: check the encoders")]
     EncodersFrozen,
     /// A motor's angle and its speed contradict each other.
     #[error(
-        "the {motor} motor's angle changed by {mismatch_rad:.2} rad more than its speed says: check the encoder, and \
+        "the angle of the {motor} motor and its integrated speed differ by {mismatch_rad:.2} rad: check the encoder, and \
          encoder_steps in [link]"
     )]
     EncoderMismatch {
@@ -263,8 +263,8 @@ pub enum StopReason {
     },
     /// Wheels and IMU contradict each other about the heading.
     #[error(
-        "the robot turned by {mismatch_rad:.2} rad more by its wheels than by the IMU: check the encoders, that no wheel \
-         slips, and that left_motor_id and right_motor_id in [link] are not swapped"
+        "yaw from the wheels and from the IMU differ by {mismatch_rad:.2} rad: check the encoders and for wheel \
+         slip, and whether left_motor_id and right_motor_id in [link] are swapped"
     )]
     YawMismatch {
         /// Heading by the wheels less that by the IMU, rad.
@@ -272,7 +272,7 @@ pub enum StopReason {
     },
     /// A motor turns against its torque.
     #[error(
-        "the {motor} motor turns against its torque: check the motor's calibration and its phase wires, and \
+        "the {motor} motor turns in the direction opposite to its torque: check the motor's calibration and its phase wires, and \
          {motor}_direction in [link]"
     )]
     TorqueReversed {
@@ -281,19 +281,19 @@ pub enum StopReason {
     },
     /// Each motor turns by the torque of the other one.
     #[error(
-        "each motor turns by the torque of the other one: check left_motor_id and right_motor_id in [link], and the slots \
+        "each motor responds to the torque of the other one: check left_motor_id and right_motor_id in [link], and the slots \
          of torque_command"
     )]
     TorquesSwapped,
     /// Neither wheels nor body move under a torque.
     #[error(
-        "the robot is held: neither its wheels nor its body moved under a torque. Let it go once it is armed"
+        "the robot is held: neither its wheels nor its body responded to torque: release it after arming"
     )]
     Held,
     /// Wheels that are to be in the air are not.
     #[error(
-        "the wheels are on the ground or held: they turned {factor:.2} times as fast as in the air. Lift them, then \
-         check and arm again"
+        "the wheels are on the ground or held: they responded {factor:.2} times as fast as in the air: lift them, \
+         then check and arm again"
     )]
     WheelsOnGround {
         /// Speed over that in the air.
@@ -301,7 +301,7 @@ pub enum StopReason {
     },
     /// The torque acts later than the model says.
     #[error(
-        "the torque acts {delay_s:.3} s later than delay_s in [actuation] says: check the latency of the CAN adapter, or \
+        "the torque acts {delay_s:.3} s later than delay_s in [actuation]: check the latency of the CAN adapter, or \
          set delay_s and design again"
     )]
     TorqueDelay {
@@ -319,9 +319,9 @@ pub enum StopReason {
         /// From a query to its reply, s.
         round_trip_s: f64,
     },
-    /// A motor does much more or less than it is asked for.
+    /// A motor does much more or less than it is requested.
     #[error(
-        "the motors do {factor:.2} times what they are asked for: check torque_constant_nm_a (0.32 or 0.81) and \
+        "the torque of the motors is {factor:.2} times the command: check torque_constant_nm_a (0.32 or 0.81) and \
          current_steps_per_a (124.12 or 62.5) in [link]"
     )]
     TorqueScale {
@@ -329,7 +329,7 @@ pub enum StopReason {
         factor: f64,
     },
     /// A reading that is no number, or a torque that would be none.
-    #[error("a reading is not a finite number")]
+    #[error("a measurement is not a finite number")]
     NotFinite,
     /// A tick came too late.
     #[error("a tick of the control loop came {late_s:.3} s late: close other programs")]
@@ -338,7 +338,7 @@ pub enum StopReason {
         late_s: f64,
     },
     /// The bus does not work.
-    #[error("the CAN bus does not work: bus off, adapter unplugged or queue full")]
+    #[error("CAN bus failure: bus off, adapter unplugged or queue full")]
     BusDown,
 }
 
@@ -346,7 +346,7 @@ impl StopReason {
     /// Name for files and scripts.
     pub fn name(&self) -> &'static str {
         match self {
-            Self::Asked => "asked",
+            Self::Requested => "requested",
             Self::TimeOver => "time_over",
             Self::Done => "done",
             Self::ImuSilent { .. } => "imu_silent",
@@ -419,7 +419,7 @@ pub struct Check {
     pub name: &'static str,
     /// How it stands.
     pub result: CheckResult,
-    /// What was found and, unless it is right, the mend.
+    /// What was found and, unless it is right, the remedy.
     pub text: String,
 }
 

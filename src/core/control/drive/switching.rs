@@ -3,14 +3,10 @@
 use std::time::Duration;
 
 use crate::link::{MotorEvent, MotorOrder};
-use crate::robot::Motor;
+use crate::model::Motor;
 
 /// Time between two orders of the same kind.
 const REPEAT: Duration = Duration::from_millis(5);
-/// Command bytes that are acknowledged (LK protocol).
-const OFF: u8 = 0x80;
-const ON: u8 = 0x88;
-
 /// Longest time for which motors roll out without torque before they are switched off.
 const ROLL_OUT: Duration = Duration::from_secs(1);
 
@@ -55,11 +51,11 @@ impl Switching {
 
     /// Takes what the motors have said since the order was first given; health that says so will do as well.
     pub(super) fn hear(&mut self, events: &[MotorEvent]) {
-        let wanted = if self.order == MotorOrder::On { ON } else { OFF };
+        let wanted = self.order == MotorOrder::On;
         for event in events {
             let (motor, time, done) = match *event {
-                MotorEvent::Acknowledged { motor, time, command } => (motor, time, command == wanted),
-                MotorEvent::Health(motor, health) => (motor, health.time, health.on == Some(wanted == ON)),
+                MotorEvent::Switched { motor, time, on } => (motor, time, on == wanted),
+                MotorEvent::Health(motor, health) => (motor, health.time, health.on == Some(wanted)),
                 _ => continue,
             };
             self.acknowledged[motor as usize] |= done && time >= self.since;

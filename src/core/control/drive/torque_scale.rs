@@ -1,11 +1,11 @@
-//! Whether the motors do what they are asked for.
+//! Whether the motors do what they are requested.
 //!
 //! Sources disagree on the steps of the current command by a factor of 1.986, and the two windings' torque constants
 //! differ by 2.53. Quiet balancing cannot tell: torques are then as small as the friction, which holds the motors most
 //! of the time. So soon after arming both motors get the same nudge on top of what the controller asks for, one way for
 //! 40 ms and back for 40 ms, and the encoders tell how far it went:
 //! q̄(t) = q₀ + q̇₀ t + ½ c t² + f ∬ b ΣT, where b is the model's response to a torque, c the gravity and friction of
-//! those 80 ms, and f the factor that is looked for. What the controller asked for meanwhile is part of ΣT. An unknown
+//! those 80 ms, and f the factor that is looked for. What the controller requested meanwhile is part of ΣT. An unknown
 //! payload changes b little, because mass and inertia grow together in numerator and denominator.
 //!
 //! A wrong factor has other causes than the scale, which are named: the torque acts later than the model says (the
@@ -16,9 +16,8 @@ use std::ops::RangeInclusive;
 
 use super::regression::least_squares;
 use super::stage::StopReason;
-use crate::control::Readings;
-use crate::model_file::RobotModel;
-use crate::robot::TICK_S;
+use crate::model::{RobotModel, TICK_S};
+use crate::record::Readings;
 
 /// Time from arming to the nudge, s: on the ground, for the robot to be let go and to settle; in the air, for the
 /// motors to be on.
@@ -27,7 +26,7 @@ const START_AIR_S: f64 = 0.25;
 /// Each way of the nudge, s, and the change of the motors' speed that it aims at, rad/s.
 const HALF_S: f64 = 0.04;
 const SPEED_RAD_S: f64 = 0.6;
-/// Least torque of the nudge, several times the friction of such motors, N m; and greatest share of the limit.
+/// Least torque of the nudge, several times the friction of such motors, N m; and greatest fraction of the limit.
 const LEAST_NM: f64 = 0.5;
 const GREATEST_SHARE: f64 = 0.5;
 /// Factors that are let pass, and deviations that the estimate has to lie outside.
@@ -38,10 +37,10 @@ const DEVIATIONS: f64 = 3.0;
 const LARGEST_DEVIATION: f64 = 0.1;
 const NUDGES: u32 = 3;
 const NEXT_S: f64 = 1.0;
-/// Time between two ticks, and age of the motors' reading, beyond which this computer or the bus stood still and a nudge
-/// may lie, s; it takes so many of those to say that the motors do something else.
-const LATE_S: f64 = 0.003;
-const STALE_S: f64 = 0.01;
+/// Time between two ticks, and age of the motors' reading, beyond which this computer or the bus stood still and a
+/// nudge may lie, s; it takes so many of those to say that the motors do something else.
+pub(super) const LATE_S: f64 = 0.003;
+pub(super) const STALE_S: f64 = 0.01;
 const AGREEING: u32 = 2;
 /// Delays beyond the model's that are tried, ticks, and the largest residual compared with that without, squared, of
 /// one that explains the nudge.
@@ -86,7 +85,7 @@ struct Row {
 /// What has come of the nudges.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Verdict {
-    /// The motors do what they are asked for, as far as payload and friction let see.
+    /// The motors do what they are requested, as far as payload and friction let see.
     Right,
     /// They surely do not, for this reason.
     Wrong(StopReason),
@@ -138,7 +137,8 @@ impl TorqueScale {
         }
     }
 
-    /// Takes the readings of a tick, how old the motors' are, and the torques that acted since the last; the verdict, once.
+    /// Takes the readings of a tick, how old the motors' are, and the torques that acted since the last; the verdict,
+    /// once.
     pub(super) fn step(
         &mut self,
         time_s: f64,

@@ -1,16 +1,16 @@
 //! Whether each motor turns the way its torque is meant to turn it.
 //!
-//! Within 80 ms of arming one motor after the other gets a small torque forward for 10 ms and back for 10 ms, on top of
-//! what the controller commands. Each encoder shows how far it went under both torques:
-//! qᵢ(t) = q₀ + q̇₀ t + ½ c t² + a ∬ Tᵢ + b ∬ Tⱼ, where c is the gravity of those milliseconds, and a and b are compared
-//! with the model's [`Response`]. Friction makes a smaller and never negative, so its sign is clear before its size is.
+//! Within 80 ms of arming one motor after the other gets a small torque forward for 10 ms and back for 10 ms, on top
+//! of what the controller commands. Each encoder shows how far it went under both torques: qᵢ(t) = q₀ + q̇₀ t + ½ c
+//! t² + a ∬ Tᵢ + b ∬ Tⱼ, where c is the gravity of those milliseconds, and a and b are compared with the model's
+//! [`Response`]. Friction makes a smaller and never negative, so its sign is clear before its size is.
 
 use super::regression::least_squares;
 use super::stage::StopReason;
+use super::torque_scale::{LATE_S, STALE_S};
 use super::wheel_watch::Response;
-use crate::control::Readings;
-use crate::model_file::RobotModel;
-use crate::robot::{Motor, TICK_S};
+use crate::model::{Motor, RobotModel, TICK_S};
+use crate::record::Readings;
 
 /// Time from arming to the first torque, s, by which the motors are on; and each pulse, s.
 const START_S: f64 = 0.03;
@@ -24,9 +24,9 @@ const FRICTION_FACTOR: f64 = 1.5;
 const GREATEST_FRACTION: f64 = 0.3;
 /// Fractions of the model's response beyond which a motor turns the wrong way, surely the right one, or the right one
 /// late.
-const WRONG: f64 = -0.3;
-const RIGHT: f64 = 0.2;
-const LATE: f64 = 0.4;
+const WRONG: f64 = -0.15;
+const RIGHT: f64 = 0.15;
+const LATE: f64 = 0.15;
 const DEVIATIONS: f64 = 3.0;
 /// Tries on the ground, where a robot that is still held may not move; and time between two, s.
 const TRIES: u32 = 3;
@@ -45,6 +45,8 @@ pub(super) struct TorqueSign {
     rows: Vec<Row>,
     motion: [Motion; 2],
     last_s: f64,
+    /// Whether a tick or a reading of this try was late: torques that act later than they are sent look reversed.
+    is_late: bool,
 }
 
 /// Time since the first pulse, s, motor angles, rad, and integral of each torque once and twice.
@@ -76,6 +78,7 @@ impl TorqueSign {
             rows: Vec::with_capacity(64),
             motion: [Motion::default(); 2],
             last_s: 0.0,
+            is_late: false,
         }
     }
 
@@ -95,11 +98,12 @@ impl TorqueSign {
         }
     }
 
-    /// Takes the readings of a tick and the torques that acted since the last; a motor that turns the wrong way, once.
+    /// Takes the readings of a tick, how old the motors' are, and the torques that acted since the last; a motor that
+    /// turns the wrong way, once.
     pub(super) fn step(
         &mut self,
         time_s: f64,
-        readings: &Readings,
+        (readings, age_s): (&Readings, f64),
         acted_nm: [f64; 2],
     ) -> Option<StopReason> {
         let since_s = time_s - self.start_s;
@@ -108,6 +112,7 @@ impl TorqueSign {
         if self.tries_left == 0 || since_s < 0.0 {
             return None;
         }
+        self.is_late |= passed_s > LATE_S || age_s > STALE_S;
         for (motion, torque_nm) in self.motion.iter_mut().zip(acted_nm) {
             let change = torque_nm * passed_s;
             motion.way += (motion.speed + 0.5 * change) * passed_s;
@@ -118,7 +123,7 @@ impl TorqueSign {
         if since_s < 4.0 * PULSE_S + SETTLE_S {
             return None;
         }
-        let found = self.found();
+        let found = if std::mem::take(&mut self.is_late) { None } else { self.found() };
         self.rows.clear();
         self.motion = [Motion::default(); 2];
         self.start_s += NEXT_S;
@@ -143,7 +148,7 @@ impl TorqueSign {
         None
     }
 
-    /// Responses of both motors; none where right ones to torques that act later than the model says fit better, because
+    /// Responses of both motors; `None` if right ones to torques that act later than the model says fit better, because
     /// a pulse that is late looks like a reversed one.
     fn found(&self) -> Option<[Factors; 2]> {
         let residual = |factors: &[Factors; 2]| factors[0].residual + factors[1].residual;

@@ -8,24 +8,24 @@ use super::exchange::Inputs;
 use super::imu_watch::ImuWatch;
 use super::stage::StopReason;
 use crate::link::{ImuReading, MotorEvent, MotorHealth, MotorState};
-use crate::robot::{Motor, SafetyLimits, State, TICK_S};
+use crate::model::{Motor, SafetyLimits, State, TICK_S};
 
-/// Longest time without a motor's voltage and errors, which are asked for some 22 times a second.
+/// Longest time without a motor's voltage and errors, which are requested some 22 times a second.
 const HEALTH_TIMEOUT: Duration = Duration::from_millis(300);
 /// Time from arming until a motor's health surely answers a query that came after the order to switch on.
 const ON_SETTLE: Duration = Duration::from_millis(100);
 /// Newest round trips of a motor that are remembered: those of about a second.
 const ROUND_TRIPS: usize = 24;
 
-/// What was heard of one motor, and when.
+/// What was received of one motor, and when.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct MotorWatch {
     pub(super) state: Option<MotorState>,
     pub(super) health: Option<MotorHealth>,
-    /// When another controller was heard last to command it, and the command.
+    /// When another controller was received last to command it, and the command.
     pub(super) commanded: Option<(Duration, u16)>,
     pub(super) round_trips: RoundTrips,
-    /// When it was heard again after a silence over which its turns cannot be known.
+    /// When it was received again after a silence over which its turns cannot be known.
     turns_lost: Option<Duration>,
 }
 
@@ -36,7 +36,7 @@ pub(super) struct RoundTrips {
     count: usize,
 }
 
-/// Everything that is heard of the robot.
+/// Everything that is received of the robot.
 #[derive(Clone, Debug)]
 pub(super) struct Watch {
     pub(super) motors: [MotorWatch; 2],
@@ -50,7 +50,7 @@ impl Watch {
         Self { motors: [MotorWatch::default(); 2], imu: ImuWatch::new(), not_finite: false }
     }
 
-    /// Takes what was heard; readings that are no numbers are only noted.
+    /// Takes what was received; readings that are no numbers are only noted.
     pub(super) fn hear(&mut self, inputs: &Inputs<'_>, limits: &SafetyLimits) {
         self.not_finite = false;
         for event in inputs.motors {
@@ -78,7 +78,7 @@ impl Watch {
                 self.motors[motor as usize].commanded = Some((time, command));
             }
             MotorEvent::TurnsLost { motor, time, .. } => self.motors[motor as usize].turns_lost = Some(time),
-            MotorEvent::Acknowledged { .. } => {}
+            MotorEvent::Switched { .. } => {}
         }
     }
 
@@ -113,7 +113,8 @@ impl Watch {
 }
 
 impl MotorWatch {
-    /// Nobody can have been heard while the control loop was late: silence counts up to `heard_by`, when it was to step.
+    /// Nobody can have been received while the control loop was late: silence counts up to `heard_by`, when it was to
+    /// step.
     fn problem(
         &self,
         motor: Motor,
@@ -221,7 +222,7 @@ fn is_finite(event: &MotorEvent) -> bool {
             [state.angle_rad, state.speed_rad_s, state.current_a].iter().all(|v| v.is_finite())
         }
         MotorEvent::Health(_, health) => health.temperature_c.is_finite() && health.voltage_v.is_finite(),
-        MotorEvent::Acknowledged { .. } | MotorEvent::TurnsLost { .. } => true,
+        MotorEvent::Switched { .. } | MotorEvent::TurnsLost { .. } => true,
         MotorEvent::Commanded { current_a, .. } => current_a.is_none_or(f64::is_finite),
     }
 }

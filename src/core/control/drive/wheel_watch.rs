@@ -7,8 +7,7 @@ use super::watch::age_s;
 use crate::control::{Odometry, yaw_inertia_kg_m2};
 use crate::friction::Stribeck;
 use crate::link::{ImuReading, MotorState};
-use crate::model_file::RobotModel;
-use crate::robot::{Motor, SafetyLimits};
+use crate::model::{Motor, RobotModel, SafetyLimits};
 
 /// Time constants over which an angle and the integrated speed, and the heading by wheels and by gyro are compared, s.
 const ANGLE_MEMORY_S: f64 = 1.0;
@@ -22,15 +21,15 @@ const HELD_NM: f64 = 0.02;
 const STATIC_NM: f64 = 0.1;
 /// Readings in a row that have to disagree: a single one may be damaged.
 const DISAGREEING: u32 = 3;
-/// Pitch rate that counts as one way, rad/s: ten times the noise of a gyroscope; and changes of its sign that prove that
-/// the motors turn.
+/// Pitch rate that counts as one way, rad/s: ten times the noise of a gyroscope; and changes of its sign that prove
+/// that the motors turn.
 const SWING_RAD_S: f64 = 0.01;
 const SWINGS: u32 = 3;
 /// Least motion of the body that tells a frozen encoder from a robot that is held, rad: several times the noise of a
 /// pitch.
 const BODY_RAD: f64 = 0.015;
 
-/// Acceleration of a motor under a torque of its own and of the other motor, rad/s² per N m, at standstill.
+/// Acceleration of a motor under a separate torque and of the other motor, rad/s² per N m, at standstill.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Response {
     pub(super) own: f64,

@@ -26,13 +26,13 @@ impl Advice {
 pub(super) fn advice(can: &[CanInterface], serial: &[SerialPort]) -> Vec<Advice> {
     let port = serial.iter().find(|port| port.is_usb).map_or(usual_port(), |port| port.port.as_str());
     let monitor = format!("flqr monitor slcan:{port}@1000000");
-    let adapter = Advice::new("an SLCAN adapter on a serial port, without any set-up", &[&monitor]);
+    let adapter = Advice::new("an SLCAN adapter on a serial port, without setup", &[&monitor]);
     let mut all: Vec<_> = can.iter().filter_map(bring_up).collect();
     if cfg!(target_os = "linux") {
         all.extend(linux(can, port));
     }
     all.push(adapter);
-    all.push(Advice::new("no hardware at all: the emulated robot", &["flqr monitor emulated"]));
+    all.push(Advice::new("the emulated robot, without hardware", &["flqr monitor emulated"]));
     all
 }
 
@@ -46,14 +46,14 @@ fn linux(can: &[CanInterface], port: &str) -> Vec<Advice> {
     if can.is_empty() {
         let up = "sudo ip link set can0 up type can bitrate 1000000 restart-ms 100";
         all.push(Advice::new(
-            "a CAN adapter with a driver of its own (gs_usb, PEAK, Kvaser), once plugged in",
+            "a CAN adapter with a kernel driver (gs_usb, PEAK, Kvaser), after it is plugged in",
             &[up],
         ));
     }
     if !can.iter().any(|interface| interface.is_virtual) {
         let make =
             ["sudo modprobe vcan", "sudo ip link add dev vcan0 type vcan", "sudo ip link set vcan0 up"];
-        all.push(Advice::new("a virtual CAN interface, to try things without hardware", &make));
+        all.push(Advice::new("a virtual CAN interface, for tests without hardware", &make));
     }
     let attach = format!("sudo slcand -o -c -s8 {port} slcan0");
     let as_interface = "an SLCAN adapter as a CAN interface, for several programs at once";

@@ -5,8 +5,8 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use super::{Item, RecorderError};
+use crate::model::Motor;
 use crate::record::recording::{self, About, Names};
-use crate::robot::Motor;
 
 /// Largest piece that is handed to the system at once, bytes.
 const BLOCK: usize = 1 << 16;
@@ -170,14 +170,18 @@ impl Part {
         let file = self.path.display();
         match error.kind() {
             io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
-                format!("{file}: the disk is full and the recording has ended: make room and start a new one")
+                format!(
+                    "{file}: the disk is full and the recording has stopped: free disk space and start a new one"
+                )
             }
             io::ErrorKind::NotFound => {
                 format!(
-                    "{file} is gone and the recording has ended: leave its folder in place and start a new one"
+                    "{file} is gone and the recording has stopped: do not move its folder, and start a new one"
                 )
             }
-            _ => format!("{file}: {error}, and the recording has ended: check the disk and start a new one"),
+            _ => {
+                format!("{file}: {error}, and the recording has stopped: check the disk and start a new one")
+            }
         }
     }
 }

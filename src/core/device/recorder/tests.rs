@@ -114,7 +114,7 @@ fn a_full_disk_ends_the_recording_with_the_rows_and_frames_that_are_not_in_its_f
     let status = input.shared.status().clone();
     assert_eq!(
         status.problem.as_deref(),
-        Some("run.log: the disk is full and the recording has ended: make room and start a new one")
+        Some("run.log: the disk is full and the recording has stopped: free disk space and start a new one")
     );
     // Two lines of 47 bytes fit.
     assert_eq!((status.rows, status.frames, input.shared.lost()), (0, 2, [1, 1, 0]));
@@ -138,7 +138,7 @@ fn a_full_disk_ends_the_recording_with_the_rows_and_frames_that_are_not_in_its_f
     assert_eq!(
         problem,
         Some(
-            "run.csv: the disk is full and the recording has ended: make room and start a new one; 3 rows were lost"
+            "run.csv: the disk is full and the recording has stopped: free disk space and start a new one; 3 rows were lost"
         )
     );
     assert_eq!((status.rows, status.rows_lost), (2, 3));
@@ -220,5 +220,5 @@ fn a_file_that_is_taken_away_is_missed() {
     let mut files = bench(1, usize::MAX, usize::MAX).writer.files;
     files.frames.path = "no such folder/run.log".into();
     let problem = files.look().unwrap_err();
-    assert!(problem.starts_with("no such folder/run.log is gone and the recording has ended"), "{problem}");
+    assert!(problem.starts_with("no such folder/run.log is gone and the recording has stopped"), "{problem}");
 }

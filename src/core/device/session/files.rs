@@ -22,15 +22,17 @@ impl FileError {
     fn new(file: &Path, error: &io::Error) -> Self {
         let problem = match error.kind() {
             io::ErrorKind::NotFound => "there is no such file: check the path".to_owned(),
-            io::ErrorKind::PermissionDenied => "the file may not be read: check its permissions".to_owned(),
-            io::ErrorKind::IsADirectory => "this is a folder: give a file in it".to_owned(),
+            io::ErrorKind::PermissionDenied => {
+                "permission denied: check the permissions of the file".to_owned()
+            }
+            io::ErrorKind::IsADirectory => "this is a folder: give a file".to_owned(),
             _ => format!("cannot read the file: {error}"),
         };
         Self { file: file.to_owned(), problem }
     }
 }
 
-/// Opens a recording by the name of it or of one of its files: its robot log with the raw frames beside it, or raw
+/// Opens a recording by the name of it or of one of its files: its robot log with the raw frames next to it, or raw
 /// frames alone.
 pub(super) fn open_recording(name: &Path) -> Result<Replay<BufReader<File>>, super::SessionError> {
     let names = Names::new(name);
@@ -72,7 +74,7 @@ fn holds_frames(reader: &mut impl BufRead, name: &Path) -> bool {
     })
 }
 
-/// What times count from in the robot log beside raw frames, where there is one.
+/// What times count from in the robot log next to raw frames, where there is one.
 fn start_beside(names: &Names, frames: &Path) -> Option<std::time::Duration> {
     if names.frames != frames {
         return None;

@@ -5,9 +5,10 @@ use std::time::Duration;
 use super::player::Player;
 use super::types::SessionOrder;
 use super::wire::{Inbox, Wire};
-use crate::link::{Direction, Emulator, Frame, StampedFrame};
+use crate::emulator::Emulator;
+use crate::link::{Direction, Frame, StampedFrame};
 
-/// What was heard since the last tick.
+/// What was received since the last tick.
 #[derive(Default)]
 pub(super) struct Heard {
     pub(super) inbox: Inbox,
@@ -18,7 +19,7 @@ pub(super) enum Link {
     Wire(Wire),
     /// A robot in memory, moved on by the control loop itself, and the frames that it has taken.
     Emulated(Box<Emulator>, Vec<StampedFrame>),
-    /// A recording, which is played by a loop of its own.
+    /// A recording, which is played by a separate loop.
     Replay(Box<Player>),
 }
 
@@ -96,7 +97,7 @@ impl Link {
         }
     }
 
-    /// Why nothing can be heard or sent just now.
+    /// Why nothing can be received or sent just now.
     pub(super) fn problem(&self) -> Option<String> {
         match self {
             Self::Wire(wire) => wire.problem(),
@@ -105,7 +106,7 @@ impl Link {
         }
     }
 
-    /// What may be wrong where nothing is heard.
+    /// What may be wrong where nothing is received.
     pub(super) fn hint(&self) -> Option<String> {
         if let Self::Wire(wire) = self { wire.imu_problem().or_else(|| wire.health().hint()) } else { None }
     }

@@ -1,7 +1,8 @@
 //! A robot that is watched or driven, on threads of its own.
 
+mod counters;
+mod decode;
 mod files;
-mod hearing;
 mod link;
 mod player;
 mod publisher;
@@ -9,7 +10,6 @@ mod rate;
 mod recording;
 mod relay;
 mod replaying;
-mod tally;
 mod types;
 mod wire;
 mod worker;
@@ -32,22 +32,25 @@ use std::time::{Duration, SystemTime};
 use super::pacer::lock_memory;
 use super::stop::StopLine;
 use super::{Clock, OpenError, Pacer, hurry, open_bus, open_imu};
-use crate::control::drive::{Drive, DriveError, DriveOrder, DriveSettings, Excitation, Listener};
-use crate::control::{BalanceController, ControlError, ControllerKind};
-use crate::link::dbc::{self, Dbc, SignalMap};
-use crate::link::{Emulator, EmulatorSettings, MotorOrder, Wheels};
+use crate::control::{
+    BalanceController, ControlError, ControllerKind,
+    drive::{Drive, DriveError, DriveOrder, DriveSettings, Excitation, Listener},
+};
+use crate::emulator::{Emulator, EmulatorSettings};
+use crate::link::{
+    MotorOrder, Wheels,
+    dbc::{self, Dbc, SignalMap},
+};
 use crate::lqr;
-use crate::model_file::RobotModel;
-use crate::record::ReplayError;
-use crate::record::recording::About;
-use crate::robot::Motor;
+use crate::model::{Motor, RobotModel};
+use crate::record::{ReplayError, recording::About};
 use crate::simulate::SimulationError;
-use hearing::{Hearing, Signals};
+use counters::LinkCounters;
+use decode::{FrameDecoder, Signals};
 use link::{Heard, Link};
 use player::Player;
 use publisher::Publisher;
 use recording::Recording;
-use tally::Tally;
 use wire::Wire;
 use worker::{Role, TICK, Worker};
 
@@ -81,7 +84,7 @@ pub enum SessionError {
     File(#[from] FileError),
     /// A recording has no motors.
     #[error(
-        "a recording can be watched but not driven: give can:INTERFACE, slcan:PORT@BITRATE or emulated in place of {source_name}"
+        "a recording can be monitored but not driven: give can:INTERFACE, slcan:PORT@BITRATE or emulated instead of {source_name}"
     )]
     ReplayDriven {
         /// The recording.
@@ -92,11 +95,11 @@ pub enum SessionError {
     Dbc {
         /// The file.
         file: PathBuf,
-        /// What is wrong, and the mend.
+        /// What is wrong, and the remedy.
         problem: String,
     },
     /// The system gives no thread.
-    #[error("no thread for the robot: {0}")]
+    #[error("cannot start the robot thread: {0}")]
     Thread(#[from] std::io::Error),
 }
 
@@ -122,7 +125,7 @@ impl Session {
     pub fn open(options: SessionOptions, wake: Waker) -> Result<Self, SessionError> {
         let clock = Clock::start();
         let signals = options.dbc.as_ref().map(|described| signals(described, &options)).transpose()?;
-        let mut hearing = Hearing::new(&options.robot.link, signals, options.imu.is_some());
+        let mut decoder = FrameDecoder::new(&options.robot.link, signals, options.imu.is_some());
         let (order_sender, orders) = sync_channel(ORDERS);
         let (update_sender, updates) = sync_channel(UPDATES);
         let stop_line = StopLine::register();
@@ -148,15 +151,15 @@ impl Session {
             recording.start(name).map_err(SessionError::Recording)?;
         }
         if matches!(options.source, Source::Replay { .. }) {
-            hearing.wheels = hearing.wheels.telling_sent();
+            decoder.wheels = decoder.wheels.telling_sent();
         }
         let worker = Worker {
             link,
             role: role(&options)?,
-            hearing,
+            decoder,
             heard: Heard::default(),
             pacer: Pacer::new(clock, TICK),
-            tally: Tally::new(options.source.bit_rate()),
+            counted: LinkCounters::new(options.source.bit_rate()),
             recording,
             orders,
             stop_line: Arc::clone(&stop_line),
@@ -224,7 +227,7 @@ impl Session {
         self.thread.take()?.join().ok()
     }
 
-    /// Whether its threads have ended although nobody asked for it: a fault of this program.
+    /// Whether its threads have ended although nobody requested it: a fault of this program.
     pub fn has_died(&self) -> bool {
         self.thread.as_ref().is_none_or(JoinHandle::is_finished)
     }
@@ -270,7 +273,7 @@ fn open_link(
     }
 }
 
-/// The controller of an emulated robot that is only listened to; none where its model makes none, so that it
+/// The controller of an emulated robot that is only listened to; `None` if its model makes none, so that it
 /// stays on its stand.
 fn on_board(robot: &RobotModel) -> Result<Option<BalanceController>, ControlError> {
     let gain = robot.weights.and_then(|weights| lqr::design(&robot.parameters.linear_model(), &weights).ok());
@@ -283,8 +286,8 @@ fn on_board(robot: &RobotModel) -> Result<Option<BalanceController>, ControlErro
 fn signals(described: &Described, options: &SessionOptions) -> Result<Signals, SessionError> {
     let refuse = |problem: String| SessionError::Dbc { file: described.file.clone(), problem };
     if options.mode != SessionMode::Listen {
-        let problem = "a robot that a DBC file describes can be watched only, to be driven it has to speak the LK \
-                       protocol: leave the file out, or listen";
+        let problem = "a robot described by a DBC file can only be monitored; driving needs the \
+                       LK protocol: leave the file out, or listen only";
         return Err(refuse(problem.to_owned()));
     }
     let text = files::read_text(&described.file, dbc::LARGEST_FILE_BYTES + 1)?;
@@ -294,12 +297,12 @@ fn signals(described: &Described, options: &SessionOptions) -> Result<Signals, S
     let map = map.map_err(|error| refuse(error.to_string()))?;
     if let Some(motor) = map.missing_motor() {
         return Err(refuse(format!(
-            "no signal is chosen for the motion of the {motor} motor: add motor_speed_{motor}_rad_s=SIGNAL or \
+            "no signal is selected for the motion of the {motor} motor: add motor_speed_{motor}_rad_s=SIGNAL or \
              motor_angle_{motor}_rad=SIGNAL"
         )));
     }
     if map.has_pitch() && options.imu.is_some() {
-        let problem = "the pitch is to come from its signals and from the IMU: leave one of the two out";
+        let problem = "the pitch is taken from both its signals and the IMU: leave one of the two out";
         return Err(refuse(problem.to_owned()));
     }
     let has_constant = options.robot.link.torque_constant_nm_a.is_some();

@@ -18,7 +18,7 @@ pub type Waker = Arc<dyn Fn() + Send + Sync>;
 enum Outlet {
     /// The thread that gathers them: that of a recording.
     Direct(SyncSender<Update>, Waker),
-    /// A thread of its own, so that a control loop is never held up.
+    /// A separate thread, so that a control loop is never held up.
     Relay(Relay),
 }
 

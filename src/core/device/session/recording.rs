@@ -1,4 +1,4 @@
-//! The recording of a session. Files are made and finished by a thread of their own: the control loop never waits for a
+//! The recording of a session. Files are made and finished by a separate thread: the control loop never waits for a
 //! disk.
 
 use std::path::{Path, PathBuf};
@@ -49,13 +49,15 @@ impl Recording {
     /// Begins one, or ends it, without waiting; [`Recording::poll`] tells what came of it.
     pub(super) fn order(&mut self, name: Option<PathBuf>) -> Result<(), String> {
         if self.work.is_some() {
-            return Err("the last recording is still being begun or ended: try again in a moment".to_owned());
+            return Err(
+                "the last recording is still being started or stopped: try again in a moment".to_owned()
+            );
         }
         let thread = Builder::new().name("recording".to_owned());
         let work = match (name, self.recorder.take()) {
             (Some(_), Some(recorder)) => {
                 self.recorder = Some(recorder);
-                return Err("a recording is being made already: end it first".to_owned());
+                return Err("a recording is already running: stop it first".to_owned());
             }
             (Some(name), None) => {
                 let (about, bench) = (self.about.clone(), self.bench);
@@ -67,7 +69,7 @@ impl Recording {
             }
             (None, None) => return Ok(()),
         };
-        self.work = Some(work.map_err(|error| format!("no thread for the recording: {error}"))?);
+        self.work = Some(work.map_err(|error| format!("cannot start the recording thread: {error}"))?);
         Ok(())
     }
 
@@ -81,7 +83,7 @@ impl Recording {
     }
 
     fn take_up(&mut self, done: Work) -> Option<(EventKind, String)> {
-        let fault = || "the recording has ended by a fault of this program".to_owned();
+        let fault = || "the recording has stopped by an internal error".to_owned();
         match done {
             Work::Begins(thread) => match thread.join().unwrap_or_else(|_| Err(fault())) {
                 Ok(recorder) => {

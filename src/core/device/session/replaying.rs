@@ -87,14 +87,14 @@ impl Worker {
     fn play_item(&mut self, slice_end: &mut Option<Duration>, time: Duration, item: ReplayItem) {
         if matches!(item, ReplayItem::Frame(_) | ReplayItem::ImuPacket(_)) {
             if self.player().is_some_and(|player| player.has_rows()) {
-                self.hearing.clear();
+                self.decoder.clear();
             } else {
                 self.slice(slice_end, time);
             }
         }
         match item {
             ReplayItem::Row(row) => {
-                self.tally.replayed(&row);
+                self.counted.replayed(&row);
                 self.keep_row(&row);
             }
             ReplayItem::Frame(frame) => self.hear_frame(&frame),
@@ -128,9 +128,9 @@ impl Worker {
         let Some(ReplayCounts { rows, frames, damaged }) = self.player().map(|player| player.counts()) else {
             return;
         };
-        let mut text = format!("the recording has come to its end: {rows} rows and {frames} frames");
+        let mut text = format!("end of the recording: {rows} rows and {frames} frames");
         if damaged > 0 {
-            text += &format!(", {damaged} damaged lines were left out");
+            text += &format!(", {damaged} damaged lines were skipped");
         }
         let now = self.position();
         self.note(now, EventKind::Note, text);

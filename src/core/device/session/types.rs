@@ -1,15 +1,16 @@
-//! A robot that is watched or driven: what is asked of the session, and what it tells.
+//! A robot that is watched or driven: what is required of the session, and what it tells.
 
 use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::Duration;
 
-use crate::control::BalanceController;
-use crate::control::drive::{Check, DriveOrder, Excitation, Stage};
-use crate::link::dbc::Choice;
-use crate::link::{MotorHealth, StampedFrame};
-use crate::model_file::RobotModel;
+use crate::control::{
+    BalanceController,
+    drive::{Check, DriveOrder, Excitation, Stage},
+};
+use crate::link::{MotorHealth, StampedFrame, dbc::Choice};
+use crate::model::RobotModel;
 use crate::record::Sample;
 
 /// Bit rate of an LK motor's bus as delivered, bit/s.
@@ -32,7 +33,7 @@ pub enum Source {
     },
     /// A robot emulated in this program.
     Emulated,
-    /// A recording: the robot log, or the raw frames beside it.
+    /// A recording: the robot log, or the raw frames next to it.
     Replay {
         /// File.
         file: PathBuf,
@@ -41,7 +42,7 @@ pub enum Source {
 
 /// A source that cannot be read.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no source is called `{text}`: give can:INTERFACE, slcan:PORT@BITRATE, emulated or replay:FILE")]
+#[error("unknown source `{text}`: give can:INTERFACE, slcan:PORT@BITRATE, emulated or replay:FILE")]
 pub struct SourceError {
     text: String,
 }
@@ -89,8 +90,8 @@ impl Source {
         }
     }
 
-    /// Bit rate of the bus, bit/s; `None` of a recording. A virtual interface has none and is taken for a motor's bus as
-    /// delivered.
+    /// Bit rate of the bus, bit/s; `None` of a recording. A virtual interface has none and is taken for a motor's bus
+    /// as delivered.
     pub(super) fn bit_rate(&self) -> Option<u32> {
         match self {
             Self::Slcan { bit_rate, .. } => Some(*bit_rate),
@@ -117,7 +118,7 @@ pub struct SerialAddress {
 
 /// A serial port that cannot be read from its name.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no serial port is written `{text}`: give serial:PORT@BAUD, as in serial:/dev/ttyUSB0@115200")]
+#[error("invalid serial port `{text}`: give serial:PORT@BAUD, such as serial:/dev/ttyUSB0@115200")]
 pub struct SerialAddressError {
     text: String,
 }
@@ -143,7 +144,7 @@ impl fmt::Display for SerialAddress {
 /// Whether anything may ever be sent.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SessionMode {
-    /// Nothing is sent, whatever is asked for later.
+    /// Nothing is sent, whatever is requested later.
     Listen,
     /// Listens until armed in two steps.
     Drive {
@@ -188,7 +189,7 @@ pub struct SessionOptions {
     pub robot: RobotModel,
     /// Whether anything may be sent.
     pub mode: SessionMode,
-    /// Recording from the start: the robot log; the raw frames go to a file beside it.
+    /// Recording from the start: the robot log; the raw frames go to a file next to it.
     pub record: Option<PathBuf>,
     /// Seed of an emulated robot's noise.
     pub seed: u64,
@@ -196,7 +197,7 @@ pub struct SessionOptions {
     pub replay_speed: f64,
 }
 
-/// What is asked of a running session.
+/// What is required of a running session.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SessionOrder {
     /// To the drive.
@@ -221,7 +222,7 @@ pub enum SessionOrder {
 /// What has happened since the last update.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Update {
-    /// Rows of the robot log; where more than 0.1 s are between two, nothing was heard, and no line is drawn.
+    /// Rows of the robot log; where more than 0.1 s are between two, nothing was received, and no line is drawn.
     pub samples: Vec<Sample>,
     /// The newest raw frames, at most [`Update::FRAMES`].
     pub frames: Vec<StampedFrame>,
@@ -300,12 +301,12 @@ pub struct Status {
 /// Whether frames come.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Connection {
-    /// Open, and the robot is heard through the source that was named; its IMU on a line of its own does not count.
+    /// Open, and the robot is received through the source that was named; its IMU on a separate line does not count.
     #[default]
     Connected,
-    /// Open, but nothing has been heard yet, or for a second.
+    /// Open, but nothing has been received yet, or for a second.
     Silent {
-        /// What may be wrong, and the mend.
+        /// What may be wrong, and the remedy.
         hint: String,
     },
     /// Lost; it is tried again by itself.

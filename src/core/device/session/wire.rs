@@ -229,9 +229,9 @@ impl Wire {
     /// Why the bus does not work just now.
     pub(super) fn problem(&self) -> Option<String> {
         self.health.lost().or_else(|| match self.health.state() {
-            BusState::BusOff => Some("bus off: look at wiring, termination and bit rate".to_owned()),
+            BusState::BusOff => Some("bus off: check wiring, termination and bit rate".to_owned()),
             _ if self.shared.refused.load(Ordering::Relaxed) < REFUSED_IN_A_ROW => None,
-            _ => Some("the bus takes no more frames: nobody on it acknowledges them".to_owned()),
+            _ => Some("the bus accepts no more frames: no node acknowledges them".to_owned()),
         })
     }
 

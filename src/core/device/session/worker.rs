@@ -1,15 +1,15 @@
-//! The control loop's thread: everything that was heard goes in, everything that is sent or shown comes out.
+//! The control loop's thread: everything that was received goes in, everything that is sent or shown comes out.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError};
 use std::time::Duration;
 
-use super::hearing::Hearing;
+use super::counters::LinkCounters;
+use super::decode::FrameDecoder;
 use super::link::{Heard, Link};
 use super::publisher::Publisher;
 use super::recording::Recording;
-use super::tally::Tally;
 use super::types::{Connection, DriveStatus, Ending, Event, EventKind, SessionOrder, Status, Timing};
 use crate::control::drive::{Drive, DriveEvent, DriveOrder, Inputs, Listener, Output, Stage, StopReason};
 use crate::device::stop::StopLine;
@@ -26,8 +26,8 @@ const SILENT: Duration = Duration::from_secs(1);
 /// come back.
 const FAREWELL: Duration = Duration::from_secs(2);
 
-/// Lateness from which on this computer, and not the robot, is taken for the cause of a silence: half of the time that a
-/// motor may be silent.
+/// Lateness from which on this computer, and not the robot, is taken for the cause of a silence: half of the time
+/// that a motor may be silent.
 const BUSY: Duration = Duration::from_millis(10);
 
 /// What the samples are made by.
@@ -40,10 +40,10 @@ pub(super) enum Role {
 pub(super) struct Worker {
     pub(super) link: Link,
     pub(super) role: Role,
-    pub(super) hearing: Hearing,
+    pub(super) decoder: FrameDecoder,
     pub(super) heard: Heard,
     pub(super) pacer: Pacer,
-    pub(super) tally: Tally,
+    pub(super) counted: LinkCounters,
     pub(super) recording: Recording,
     pub(super) orders: Receiver<SessionOrder>,
     pub(super) stop_line: Arc<StopLine>,
@@ -70,7 +70,7 @@ impl Worker {
                 break;
             }
             let now = tick.due + tick.late;
-            self.tally.tick(&tick);
+            self.counted.tick(&tick);
             self.tick(now, tick.late);
             if self.publisher.is_due(tick.due) {
                 self.publish(now);
@@ -113,8 +113,8 @@ impl Worker {
     /// One period of the control loop.
     fn tick(&mut self, now: Duration, late: Duration) {
         self.link.collect(now, &mut self.heard);
-        self.tally.lost(self.heard.inbox.lost);
-        self.hearing.clear();
+        self.counted.lost(self.heard.inbox.lost);
+        self.decoder.clear();
         if matches!(self.role, Role::Listen(_)) {
             self.listen(now);
         } else {
@@ -122,7 +122,7 @@ impl Worker {
         }
     }
 
-    /// Takes what was heard in slices of a millisecond, so that every one of them makes a sample however late
+    /// Takes what was received in slices of a millisecond, so that every one of them makes a sample however late
     /// this thread comes.
     fn listen(&mut self, now: Duration) {
         self.drive_orders.clear();
@@ -154,23 +154,23 @@ impl Worker {
         end.get_or_insert(time + TICK);
     }
 
-    /// The sample of what has been heard by `now`.
+    /// The sample of what has been received by `now`.
     pub(super) fn sample(&mut self, now: Duration) {
         self.tell_lost_turns();
         let Role::Listen(listener) = &mut self.role else { return };
-        let sample = listener.hear(now, &self.hearing.motors, &self.hearing.imu);
-        self.hearing.clear();
+        let sample = listener.hear(now, &self.decoder.motors, &self.decoder.imu);
+        self.decoder.clear();
         if let Some(sample) = sample {
             self.keep(sample);
         }
     }
 
     fn tell_lost_turns(&mut self) {
-        for index in 0..self.hearing.motors.len() {
-            if let MotorEvent::TurnsLost { motor, time, silent } = self.hearing.motors[index] {
+        for index in 0..self.decoder.motors.len() {
+            if let MotorEvent::TurnsLost { motor, time, silent } = self.decoder.motors[index] {
                 let silent_s = silent.as_secs_f64();
                 let text = format!(
-                    "the {motor} motor was silent for {silent_s:.2} s: its angle and the way go on from where they were"
+                    "the {motor} motor was silent for {silent_s:.2} s: its angle and the displacement continue from their last values"
                 );
                 self.note(time, EventKind::Warning, text);
             }
@@ -178,16 +178,16 @@ impl Worker {
     }
 
     pub(super) fn hear_frame(&mut self, frame: &StampedFrame) {
-        self.hearing.frame(frame, &mut self.tally, self.recording.input.as_ref());
+        self.decoder.frame(frame, &mut self.counted, self.recording.input.as_ref());
         self.publisher.frame(*frame);
     }
 
     pub(super) fn hear_imu(&mut self, time: Duration, bytes: &[u8]) {
-        self.hearing.imu_bytes(time, bytes, &mut self.tally, self.recording.input.as_ref());
+        self.decoder.imu_bytes(time, bytes, &mut self.counted, self.recording.input.as_ref());
     }
 
     fn keep(&mut self, sample: Sample) {
-        let row = self.tally.row(&sample);
+        let row = self.counted.row(&sample);
         self.keep_row(&row);
     }
 
@@ -200,15 +200,15 @@ impl Worker {
 
     /// A frame that was written to the bus.
     fn hear_sent(&mut self, frame: &StampedFrame) {
-        self.hearing.sent(frame);
-        self.tally.frame(frame);
+        self.decoder.sent(frame);
+        self.counted.frame(frame);
         if let Some(recorder) = &self.recording.input {
             recorder.frame(frame);
         }
         self.publisher.frame(*frame);
     }
 
-    /// Takes all that was sent and heard since the last tick; the commands first, for the replies are told by them.
+    /// Takes all that was sent and received since the last tick; the commands first, for the replies are told by them.
     fn hear_all(&mut self) {
         let inbox = std::mem::take(&mut self.heard.inbox);
         inbox.sent.iter().for_each(|frame| self.hear_sent(frame));
@@ -225,12 +225,12 @@ impl Worker {
         }
         // A motor cannot answer a command that still waits for the sending thread.
         let late = late.max(self.link.backlog(now));
-        self.tally.lateness(now, late);
+        self.counted.lateness(now, late);
         let bus_down = self.link.problem().is_some();
         let Role::Drive(drive) = &mut self.role else { return };
         let inputs = Inputs {
-            motors: &self.hearing.motors,
-            imu: &self.hearing.imu,
+            motors: &self.decoder.motors,
+            imu: &self.decoder.imu,
             orders: &self.drive_orders,
             bus_down,
             late,
@@ -280,29 +280,29 @@ impl Worker {
         ) {
             return;
         }
-        let greatest = self.tally.greatest_lateness(now);
+        let greatest = self.counted.greatest_lateness(now);
         let greatest_ms = 1e3 * greatest.as_secs_f64();
         let whose = if greatest < BUSY {
-            "the delay is not of this program: look at the robot, its adapter and cables"
+            "the delay is not caused by this program: check the robot, its adapter and cables"
         } else {
             "this computer was too busy: close other programs"
         };
         let text = format!(
-            "in the second before the stop, the control loop and the sending thread came at most {greatest_ms:.1} ms \
-             late: {whose}"
+            "in the second before the stop, the control loop and the sending thread were at most {greatest_ms:.1} \
+             ms late: {whose}"
         );
         self.note(now, EventKind::Note, text);
     }
 
     fn send(&mut self, now: Duration, order: &MotorOrder) {
-        for frame in self.hearing.wheels.frames(order) {
+        for frame in self.decoder.wheels.frames(order) {
             if self.link.send(now, frame) {
-                // Before its reply is there, however late it is heard that the frame was sent.
-                self.hearing.sent(&StampedFrame { time: now, direction: Direction::Sent, frame });
+                // Before its reply is there, however late it is received that the frame was sent.
+                self.decoder.sent(&StampedFrame { time: now, direction: Direction::Sent, frame });
             }
         }
         if matches!(order, MotorOrder::Torque(_) | MotorOrder::ReadState) {
-            self.tally.asked();
+            self.counted.asked();
         }
     }
 
@@ -324,9 +324,9 @@ impl Worker {
     fn publish(&mut self, now: Duration) {
         self.poll_recording(now);
         let [dropped, errors, reconnects] = self.link.losses();
-        self.tally.bus(dropped, errors, reconnects);
+        self.counted.bus(dropped, errors, reconnects);
         let connection = self.connection(now);
-        let Self { role, tally, recording, pacer, publisher, .. } = self;
+        let Self { role, counted, recording, pacer, publisher, .. } = self;
         let lost = publisher.publish(recording.input.clone(), |status| {
             status.time = now;
             status.connection = connection;
@@ -340,25 +340,25 @@ impl Worker {
                     shown.checks = drive.checks().to_vec();
                 }
             }
-            status.motors = tally.motor_status(now);
-            status.imu = tally.imu_status(now);
-            status.counters = tally.counters(now, recording.recorder.as_ref().map_or(0, Recorder::lost));
+            status.motors = counted.motor_status(now);
+            status.imu = counted.imu_status(now);
+            status.counters = counted.counters(now, recording.recorder.as_ref().map_or(0, Recorder::lost));
             pacer.fill_timing(&mut status.timing);
         });
-        self.tally.lost(lost);
+        self.counted.lost(lost);
     }
 
     /// How a replay stands.
     pub(super) fn status(&mut self, now: Duration) -> Status {
         let [dropped, errors, reconnects] = self.link.losses();
-        self.tally.bus(dropped, errors, reconnects);
+        self.counted.bus(dropped, errors, reconnects);
         Status {
             time: now,
             connection: self.connection(now),
             drive: None,
-            motors: self.tally.motor_status(now),
-            imu: self.tally.imu_status(now),
-            counters: self.tally.counters(now, self.recording.recorder.as_ref().map_or(0, Recorder::lost)),
+            motors: self.counted.motor_status(now),
+            imu: self.counted.imu_status(now),
+            counters: self.counted.counters(now, self.recording.recorder.as_ref().map_or(0, Recorder::lost)),
             timing: Timing::default(),
             recording: self.recording.recorder.as_ref().map(Recorder::status),
         }
@@ -371,7 +371,7 @@ impl Worker {
         if let Some(reason) = self.link.problem() {
             return Connection::Lost { reason };
         }
-        match self.tally.heard() {
+        match self.counted.heard() {
             Some(heard) if now < heard + SILENT => Connection::Connected,
             _ => Connection::Silent { hint: self.hint() },
         }
@@ -381,13 +381,10 @@ impl Worker {
         if let Some(hint) = self.link.hint() {
             return hint;
         }
-        match self.hearing.ids() {
-            Some(ids) => format!(
-                "frames of {ids} are heard, but {}",
-                self.hearing.wanted()
-            ),
-            None => "nothing is heard: motors answer only when they are asked, by the robot's own controller or while \
-                     checking; check supply, wiring, termination and bit rate"
+        match self.decoder.ids() {
+            Some(ids) => format!("frames of {ids} are received, but {}", self.decoder.wanted()),
+            None => "no frames: motors reply only to queries of the robot's controller or of \
+                     the checks; check supply, wiring, termination and bit rate"
                 .to_owned(),
         }
     }

@@ -1,16 +1,16 @@
 //! Shafts under one effect each, against solutions on paper.
 
-use crate::effects::{Effect, Machine, MachineKind};
+use crate::effects::Machine;
 use crate::friction::{Stribeck, StribeckParameters};
-use crate::model_file::{AxisModel, AxisParameters};
+use crate::model::{AxisModel, AxisParameters, Effect, MachineKind};
 use crate::simulate::BenchPlant;
 
 const INERTIA: f64 = 0.0025;
 
-fn coulomb(level_nm: f64) -> Stribeck {
+fn coulomb(amplitude_nm: f64) -> Stribeck {
     let curve = StribeckParameters {
-        coulomb_nm: level_nm,
-        static_nm: level_nm,
+        coulomb_nm: amplitude_nm,
+        static_nm: amplitude_nm,
         viscous_nm_s_rad: 0.0,
         stribeck_speed_rad_s: 1.0,
         stribeck_exponent: 1.0,
@@ -209,7 +209,7 @@ fn friction_that_depends_on_the_angle_takes_its_work_and_holds_where_it_is_high(
 #[test]
 fn bristles_are_a_spring_first_and_coulomb_friction_then() {
     let (level, way) = (0.02, 0.01);
-    let effect = effect("presliding", &[("way_rad", way), ("level_nm", level)]);
+    let effect = effect("presliding", &[("breakaway_displacement_rad", way), ("amplitude_nm", level)]);
     // Slowly and without a kink up to a tenth of the level, and back: z' = (1 − z)/way forward and (1 + z)/way backward, so that they bend
     // by −ln 0.9 of the way and come back by ln 1.1 of it.
     let mut shaft = shaft(&effect, Some(coulomb(level)), 0.0, 0.0);
@@ -248,7 +248,7 @@ fn a_flexible_part_follows_slow_torque_and_stays_behind_fast_one() {
     // Transfer of the torque at f: 1 + s (H − 1) with H = 1/(1 − ρ² + 2iζρ), ρ = f/10 Hz.
     let (share, damping) = (0.4, 0.05);
     let effect =
-        effect("structural_mode", &[("frequency_hz", 10.0), ("damping_ratio", damping), ("share", share)]);
+        effect("structural_mode", &[("frequency_hz", 10.0), ("damping_ratio", damping), ("fraction", share)]);
     for frequency in [1.0, 10.0, 40.0] {
         let ratio: f64 = frequency / 10.0;
         let (re, im) = (1.0 - ratio * ratio, 2.0 * damping * ratio);

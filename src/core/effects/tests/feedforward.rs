@@ -2,10 +2,10 @@
 
 use super::{drawn, everywhere, machine, moments};
 use crate::control::{BalanceController, ControlError, ControllerKind};
-use crate::effects::{Declared, Effect, EffectFeedforward, Feedforward, KINDS, Law, MachineKind, Moment};
+use crate::effects::{Declared, EffectFeedforward, Feedforward, KINDS, Law, MotionSample};
 use crate::friction::Compensation;
-use crate::model_file::{AxisModel, AxisParameters, Model, Rig, RobotModel, presets};
-use crate::robot::Motor;
+use crate::model::{AxisModel, AxisParameters, Effect, MachineKind, Model, Motor, Rig, RobotModel};
+use crate::model_file::presets;
 use crate::simulate::{ControllerChoice, Experiment, Outcome, Scenario, Simulation, SimulationSettings, run};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -22,7 +22,7 @@ fn what_is_causal_needs_no_memory_and_what_is_declared_can_be_declared() {
         let effect = Effect::estimated(kind, on, None, &shape, &sizes).unwrap();
         if kind.feedforward == Feedforward::Causal {
             assert!(kind.per_motor(), "{}", kind.id);
-            assert!(effect.law(&machine(on)).at(&Moment::default()).is_some(), "{}", kind.id);
+            assert!(effect.law(&machine(on)).at(&MotionSample::default()).is_some(), "{}", kind.id);
         }
         if kind.feedforward == Feedforward::Declared && on == MachineKind::Robot {
             let small: Vec<f64> = sizes.iter().map(|size| 1e-6 * size.abs()).collect();
@@ -42,7 +42,7 @@ fn the_torque_that_comes_out_is_the_one_that_was_wanted() {
     let mut checked = 0;
     for kind in causal {
         let (shape, sizes) = drawn(kind, on, 2, rng);
-        // Shares of the torque that can be made up for.
+        // Fractions of the torque that can be made up for.
         let small: Vec<f64> = sizes.iter().map(|size| 0.2 * size).collect();
         let effect = Effect::estimated(kind, on, Some(Motor::Right), &shape, &small).unwrap();
         let fed = EffectFeedforward::new(&machine(on), std::slice::from_ref(&effect), WHOLE).unwrap();
@@ -50,7 +50,7 @@ fn the_torque_that_comes_out_is_the_one_that_was_wanted() {
         for moment in moments(50, rng) {
             let wanted = moment.torque_nm;
             let asked = fed.asked_nm(Motor::Right, &moment, wanted);
-            let action = law.at(&Moment { torque_nm: asked, ..moment }).unwrap();
+            let action = law.at(&MotionSample { torque_nm: asked, ..moment }).unwrap();
             let found = asked + action.on_motor_nm(moment.direction());
             assert!(
                 (found - wanted).abs() < 1e-9 * (1.0 + asked.abs()),

@@ -1,8 +1,8 @@
 //! Every kind at once: what all of them must do.
 
 use super::*;
-use crate::model_file::{AxisModel, AxisParameters, Model, Rig, presets};
-use crate::robot::{Motor, RobotParameters};
+use crate::model::{AxisModel, AxisParameters, Effect, MachineKind, Model, Motor, Rig, RobotParameters};
+use crate::model_file::presets;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -48,10 +48,10 @@ fn drawn(kind: &EffectKind, on: MachineKind, members: usize, rng: &mut ChaCha8Rn
     (shape, sizes)
 }
 
-fn moments(count: usize, rng: &mut ChaCha8Rng) -> Vec<Moment> {
+fn moments(count: usize, rng: &mut ChaCha8Rng) -> Vec<MotionSample> {
     let mut draw = |size: f64| rng.random_range(-size..size);
     (0..count)
-        .map(|tick| Moment {
+        .map(|tick| MotionSample {
             time_s: tick as f64 * 1e-3,
             dt_s: 1e-3,
             motor_angle_rad: draw(100.0),
@@ -69,7 +69,7 @@ fn moments(count: usize, rng: &mut ChaCha8Rng) -> Vec<Moment> {
         .collect()
 }
 
-fn actions(law: &mut dyn Law, moments: &[Moment]) -> Vec<Action> {
+fn actions(law: &mut dyn Law, moments: &[MotionSample]) -> Vec<Action> {
     moments.iter().map(|moment| law.act(moment)).collect()
 }
 
@@ -153,13 +153,13 @@ fn every_key_names_its_unit() {
         for parameter in kind.parameters {
             let (key, unit) = (parameter.key(on), parameter.unit(on));
             let pure = parameter.role == Role::Shape && key.starts_with("order")
-                || ["cos_#", "sin_#", "gain", "coefficient", "share", "damping_ratio"].contains(&key);
+                || ["cos_#", "sin_#", "gain", "coefficient", "fraction", "damping_ratio"].contains(&key);
             assert_eq!(unit == "1" || key.starts_with("order"), pure, "{}: {key} has unit {unit}", kind.id);
             let rotary = [" m", "N"].iter().any(|part| unit.contains(part)) || !unit.contains("rad");
             assert!(on != MachineKind::Linear || rotary, "{}: {key} [{unit}] on a linear axis", kind.id);
             let [lowest, highest] = parameter.range(on);
             assert!(lowest < highest && lowest.is_finite() && highest.is_finite(), "{}: {key}", kind.id);
-            assert!(parameter.meaning.len() > 5, "{}: {key}", kind.id);
+            assert!(parameter.description.len() > 5, "{}: {key}", kind.id);
         }
     }
 }
@@ -195,12 +195,12 @@ fn every_kind_survives_the_round_trip_through_a_model_file() {
 }
 
 #[test]
-fn the_readme_lists_every_kind_with_its_parameters() {
-    let readme = include_str!("../../../../README.md");
+fn the_manual_lists_every_kind_with_its_parameters() {
+    let manual = include_str!("../../../../assets/manual/files.md");
     for kind in KINDS {
         let start = format!("| `{}` | {} | ", kind.id, kind.summary.replace('|', "\\|"));
-        let row = readme.lines().find_map(|line| line.strip_prefix(&*start));
-        let row = row.unwrap_or_else(|| panic!("README has no row {start}"));
+        let row = manual.lines().find_map(|line| line.strip_prefix(&*start));
+        let row = row.unwrap_or_else(|| panic!("the manual has no row {start}"));
         for (parameter, &on) in
             kind.parameters.iter().flat_map(|p| kind.machines.iter().map(move |on| (p, on)))
         {
@@ -209,7 +209,7 @@ fn the_readme_lists_every_kind_with_its_parameters() {
         }
         let fed = match kind.feedforward {
             Feedforward::Causal => "| yes |",
-            Feedforward::Declared => "| in the number |",
+            Feedforward::Declared => "| by the parameter |",
             Feedforward::Never(_) => "| no |",
         };
         assert!(row.ends_with(fed), "{}: {row}", kind.id);
@@ -251,9 +251,11 @@ fn an_effect_that_is_turned_is_the_same_at_angles_that_count_from_elsewhere() {
         let effect = Effect::estimated(kind, on, None, &shape, &sizes).unwrap();
         for turn_rad in [-2.0, 0.0, 0.3] {
             let moments = moments(50, rng);
-            let elsewhere =
-                |moment: &Moment| Moment { motor_angle_rad: moment.motor_angle_rad + turn_rad, ..*moment };
-            let shifted: Vec<Moment> = moments.iter().map(elsewhere).collect();
+            let elsewhere = |moment: &MotionSample| MotionSample {
+                motor_angle_rad: moment.motor_angle_rad + turn_rad,
+                ..*moment
+            };
+            let shifted: Vec<MotionSample> = moments.iter().map(elsewhere).collect();
             let mut turned = effect.turned(turn_rad).law(&machine(on));
             let mut law = effect.law(&machine(on));
             let size = sizes.iter().map(|size| size.abs()).sum::<f64>();

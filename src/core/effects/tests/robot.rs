@@ -1,8 +1,7 @@
 //! The robot under one effect each, against Eqs. 4 and 5 and against the same physics said otherwise.
 
-use crate::effects::{Effect, MachineKind};
-use crate::model_file::{RobotModel, presets};
-use crate::robot::{Motor, State, Surroundings, Tether};
+use crate::model::{Effect, MachineKind, Motor, RobotModel, State, Surroundings, Tether};
+use crate::model_file::presets;
 use crate::simulate::{Forcing, Plant, Simulation, SimulationSettings};
 
 fn robot() -> RobotModel {
@@ -227,15 +226,15 @@ fn a_balancing_robot_under_every_effect_stays_finite_and_the_same_from_seed_to_s
         ("cogging", vec![("order_1", 14.0), ("cos_1_nm", 0.01), ("sin_1_nm", 0.0)]),
         ("torque_ripple", vec![("order_1", 7.0), ("cos_1", 0.05), ("sin_1", 0.0)]),
         ("position_dependent_friction", vec![("order_1", 2.0), ("cos_1_nm", 0.01), ("sin_1_nm", 0.0)]),
-        ("low_speed_friction", vec![("speed_rad_s", 0.5), ("level_nm", -0.02)]),
+        ("low_speed_friction", vec![("speed_rad_s", 0.5), ("amplitude_nm", -0.02)]),
         ("load_dependent_friction", vec![("coefficient", 0.05)]),
-        ("presliding", vec![("way_rad", 0.01), ("level_nm", 0.02)]),
+        ("presliding", vec![("breakaway_displacement_rad", 0.01), ("amplitude_nm", 0.02)]),
         ("thermal_friction", vec![("time_constant_s", 60.0), ("fall_nm", 0.01)]),
         ("backlash", vec![("gap_rad", 0.002), ("rotor_inertia_kg_m2", 1e-4)]),
         ("command_delay", vec![("delay_s", 0.002)]),
         ("actuator_lag", vec![("time_constant_s", 0.002)]),
         ("torque_deadzone", vec![("width_nm", 0.005)]),
-        ("structural_mode", vec![("frequency_hz", 30.0), ("damping_ratio", 0.05), ("share", 0.1)]),
+        ("structural_mode", vec![("frequency_hz", 30.0), ("damping_ratio", 0.05), ("fraction", 0.1)]),
         ("slosh", vec![("frequency_hz", 2.0), ("damping_ratio", 0.1), ("mass_kg", 0.5)]),
         ("wheel_slip", vec![("relaxation_s", 0.02), ("slip_m_s_n", 1e-3)]),
         ("aero_drag", vec![("drag_n_s2_m2", 1.0)]),

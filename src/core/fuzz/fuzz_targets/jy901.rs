@@ -3,9 +3,8 @@
 
 use std::time::Duration;
 
-use flqr_core::link::ImuAssembler;
-use flqr_core::link::jy901::{Decoder, RegisterWriteDecoder};
-use flqr_core::robot::LinkSettings;
+use flqr_core::link::{jy901::{Decoder, RegisterWriteDecoder}, ImuAssembler};
+use flqr_core::model::LinkSettings;
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|input: &[u8]| {

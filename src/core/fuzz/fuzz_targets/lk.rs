@@ -3,9 +3,8 @@
 
 use std::time::Duration;
 
-use flqr_core::link::lk::{Command, Reply};
-use flqr_core::link::{Direction, Frame, FrameId, StampedFrame, Wheels};
-use flqr_core::robot::{LinkSettings, StateLayout};
+use flqr_core::link::{lk::{Command, Reply}, Direction, Frame, FrameId, StampedFrame, Wheels};
+use flqr_core::model::{LinkSettings, StateLayout};
 use libfuzzer_sys::fuzz_target;
 
 const IDS: [u16; 6] = [0x141, 0x142, 0x181, 0x182, 0x280, 0x143];

@@ -2,13 +2,13 @@
 
 use std::f64::consts::PI;
 
-use crate::identify::filter::{ZeroPhase, derivative};
 use crate::record::row_time_s;
+use crate::signal::filter::{ZeroPhase, derivative};
 
 /// Highest cut-off of the position filter, Hz: faster than the friction and inertia of an axis are seen in
 /// practice, and what the published procedures on 1 kHz data use.
 const HIGHEST_CUTOFF_HZ: f64 = 100.0;
-/// The position filter's share of the acceleration's variance that may be noise; an inertia comes out too low
+/// The position filter's fraction of the acceleration's variance that may be noise; an inertia comes out too low
 /// by about that share.
 const NOISE_SHARE: f64 = 0.001;
 
@@ -29,7 +29,7 @@ pub struct Stretch {
     pub effort: Vec<f64>,
 }
 
-/// How the stretches of a log are filtered and thinned.
+/// Filtering and decimation of the segments of a log.
 pub(super) struct Sieve {
     /// Cut-off of the position filter, Hz.
     pub(super) cutoff_hz: f64,
@@ -37,7 +37,7 @@ pub(super) struct Sieve {
     pub(super) thinning: usize,
     position: ZeroPhase,
     rows: Option<ZeroPhase>,
-    /// Share of the acceleration's variance that is noise.
+    /// Fraction of the acceleration's variance that is noise.
     pub(super) noise_share: f64,
 }
 
@@ -115,7 +115,7 @@ fn uniform(rows: &[[f64; 3]], usual_step_s: f64) -> Stretch {
 }
 
 /// Position at a time between rows `left` and `left + 1`: a cubic whose slope at each row is between those of
-/// the straight lines beside it (harmonic mean, after Fritsch and Butland), so that jitter that bunches the time
+/// the straight lines next to it (harmonic mean, after Fritsch and Butland), so that jitter that bunches the time
 /// stamps makes no overshoot.
 fn cubic(rows: &[[f64; 3]], left: usize, time: f64) -> f64 {
     let line = |from: usize| (rows[from + 1][1] - rows[from][1]) / (rows[from + 1][0] - rows[from][0]);
@@ -249,7 +249,7 @@ pub fn white_noise<'a>(windows: impl Iterator<Item = &'a [f64]>) -> f64 {
     sum / (70.0 * count.max(1) as f64)
 }
 
-/// sign(v), 0 at rest.
+/// sign(v), 0 at standstill.
 pub(crate) fn direction(speed: f64) -> f64 {
     if speed == 0.0 { 0.0 } else { speed.signum() }
 }

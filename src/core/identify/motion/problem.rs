@@ -10,16 +10,16 @@ use super::stribeck_search::{Shape, Span, search};
 use super::{Axis, KnownAxis, MotionError, MotionFit, MotionParameter, MotionSeries, place};
 use crate::record::Log;
 
-/// Sine of a column's angle to the others below which its parameter is not told from them.
+/// Sine of a column's angle to the others below which its parameter is not distinguished from them.
 const INSEPARABLE: f64 = 0.01;
-/// The same, below which a warning says that they are hard to tell.
+/// Threshold below which a warning says that they are hard to distinguish.
 const HARD_TO_TELL: f64 = 0.1;
-/// Share of noise in the acceleration above which the inertia is not estimated, and above which it is named.
+/// Fraction of noise in the acceleration above which the inertia is not estimated, and above which it is named.
 const NOISE_ONLY: f64 = 0.3;
 const NOISY: f64 = 0.02;
 /// Fewest rows for each free parameter.
 const ROWS_PER_PARAMETER: usize = 5;
-/// A speed below this share of the root mean square may be a rest.
+/// A speed below this fraction of the root mean square may be a rest.
 const REST_SHARE: f64 = 0.03;
 
 /// Speeds of one stretch, from which the columns of friction are made.
@@ -253,8 +253,8 @@ impl Problem {
         Ok(self.into_fit())
     }
 
-    /// Whether the inertia acts less than what is left (a sum of squares) while the acceleration is noisy: noise
-    /// that is not white, as a jittering clock makes it, can then hide it to any degree.
+    /// Returns whether the inertia acts less than what is left (a sum of squares) while the acceleration is noisy:
+    /// noise that is not white, as a jittering clock makes it, can then hide it to any degree.
     fn inertia_is_drowned(&self, left: f64) -> bool {
         self.free[place::INERTIA] && self.noise_share() > NOISY && self.inertia_effect() < left
     }
@@ -265,7 +265,7 @@ impl Problem {
         self.values[place::INERTIA].powi(2) * acceleration.iter().map(|a| a * a).sum::<f64>()
     }
 
-    /// Share of noise in the variance of the acceleration over all rows.
+    /// Fraction of noise in the variance of the acceleration over all rows.
     fn noise_share(&self) -> f64 {
         let mut power = 0.0;
         let mut noise = 0.0;
@@ -283,7 +283,7 @@ impl Problem {
     /// Holds the inertia where the acceleration is noise.
     fn give_up_on_noise(&mut self) {
         if self.free[place::INERTIA] && self.noise_share() > NOISE_ONLY {
-            self.give_up(place::INERTIA, "the acceleration is hardly more than noise of the position");
+            self.give_up(place::INERTIA, "the acceleration is barely above the noise of the position");
         }
     }
 
@@ -301,7 +301,7 @@ impl Problem {
                 self.warn_of_near_dependence(&places, &sines);
                 return;
             };
-            self.give_up(place, "its effect is not told from that of the others in this motion");
+            self.give_up(place, "its effect cannot be separated from that of the others in this motion");
         }
     }
 
@@ -313,7 +313,7 @@ impl Problem {
             _ => "record motion at several speeds",
         };
         let key = self.axis.keys()[place];
-        let done = if self.has_model { "is held at the model's value" } else { "is left out, taken as 0" };
+        let done = if self.has_model { "is fixed at the model's value" } else { "is omitted (set to 0)" };
         self.warnings.push(format!("{key} {done}: {reason}; {advice}"));
         self.free[place] = false;
         if place == place::STATIC {
@@ -328,7 +328,7 @@ impl Problem {
         let names: Vec<&str> = close.map(|(&place, _)| keys[place]).collect();
         if !names.is_empty() {
             self.warnings.push(format!(
-                "{} are hard to tell apart in this motion: record one with more different speeds and accelerations",
+                "{} are hard to separate in this motion: record a greater variety of speeds and accelerations",
                 names.join(" and ")
             ));
         }
@@ -343,8 +343,8 @@ impl Problem {
         ] {
             if free && edge {
                 self.warnings.push(format!(
-                    "{key} ended at the bound of what this motion can tell: record slow motion in steps of \
-                     constant speed"
+                    "{key} is at the limit of what this motion can identify: record slow motion \
+                     in steps of constant speed"
                 ));
             }
         }
@@ -362,7 +362,7 @@ impl Problem {
         let widths = half_widths(&columns, &left);
         if widths.is_none() {
             self.warnings
-                .push("there are no intervals: a parameter hangs on one short part of the log".into());
+                .push("no confidence intervals: a parameter depends on one short part of the log".into());
         }
         let width = |place: usize| {
             let index = places.iter().position(|&other| other == place)?;
@@ -445,33 +445,33 @@ impl Problem {
             let (key, value) = (parameter.key, parameter.value);
             self.warnings.push(if told_from_zero {
                 format!(
-                    "{key} = {value:.3e} is negative, as on no real axis: check the signs of position and effort, \
-                     that the model has all loads on the axis, or let a model hold what is known of it"
+                    "{key} = {value:.3e} is negative, which is impossible: check the signs of position \
+                     and effort, check that the model has all loads on the axis, or give known values in a model"
                 )
             } else {
-                format!("{key} = {value:.3e} is not told from 0: record a motion in which it matters more")
+                format!("{key} = {value:.3e} is not significantly different from 0: record a motion in which it has more effect")
             });
         }
         let share = self.noise_share();
         if self.free[place::INERTIA] && share > NOISY {
             self.warnings.push(format!(
-                "noise of the position is {:.0} % of the acceleration's variance, so {} comes out too low by about \
-                 as much: record stronger accelerations or a finer position",
+                "noise of the position is {:.0} % of the acceleration's variance, which biases {} low by \
+                 about as much: record stronger accelerations or a finer position",
                 100.0 * share,
                 keys[place::INERTIA]
             ));
         }
         if self.free[place::INERTIA] && self.inertia_effect() < rmse * rmse * self.effort.len() as f64 {
             self.warnings.push(format!(
-                "{} acts less than what the model leaves unexplained, and noise would make it come out too low: \
+                "the effect of {} is smaller than the residual, and noise would bias it low: \
                  record a motion with strong accelerations",
                 keys[place::INERTIA]
             ));
         }
         if relative_error > 0.5 {
             self.warnings.push(format!(
-                "the model leaves {:.0} % of the effort unexplained: check units and columns, and that the \
-                 model has the loads on the axis",
+                "the residual is {:.0} % of the effort: check units and columns, and check \
+                 that the model has all loads on the axis",
                 100.0 * relative_error
             ));
         }

@@ -70,7 +70,7 @@ impl Normal {
     }
 }
 
-/// What is left of the target.
+/// Residual of the target.
 pub(super) fn residual(columns: &[Vec<f64>], coefficients: &DVector<f64>, target: &[f64]) -> Vec<f64> {
     let mut left = target.to_vec();
     for (column, coefficient) in columns.iter().zip(coefficients) {

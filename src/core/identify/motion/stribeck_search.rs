@@ -16,7 +16,7 @@ impl Shape {
     }
 }
 
-/// Where the shape is looked for.
+/// Search range of the shape.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Span {
     slowest: f64,
@@ -43,7 +43,7 @@ impl Span {
         self.fastest = self.fastest.max(rms);
     }
 
-    /// Whether speeds are seen at which the curve could bend.
+    /// Returns whether speeds are seen at which the curve could bend.
     pub(super) fn is_open(&self) -> bool {
         self.slowest < self.fastest
     }

@@ -376,7 +376,7 @@ fn what_the_motion_does_not_excite_is_said() {
             time.iter().map(|&t| 0.05 * speed(t).signum() + 0.002 * speed(t) + 0.001 * noise()).collect();
         Log::from_columns("made", [("time_s", time), ("motor_angle_rad", angles), ("torque_nm", torques)])
     };
-    for (speed, lost, mend) in [
+    for (speed, lost, remedy) in [
         ((|_| 5.0) as fn(f64) -> f64, "inertia_kg_m2", "strong accelerations"),
         (|_| 5.0, "offset_nm", "both directions"),
         (|_| 5.0, "viscous_nm_s_rad", "several speeds"),
@@ -384,7 +384,7 @@ fn what_the_motion_does_not_excite_is_said() {
     ] {
         let found = fit(&[made(speed)], Axis::Rotary, None, &[]);
         assert_eq!(found.parameter(lost), None, "{found:#?}");
-        assert!(found.warnings.iter().any(|w| w.starts_with(lost) && w.contains(mend)), "{found:#?}");
+        assert!(found.warnings.iter().any(|w| w.starts_with(lost) && w.contains(remedy)), "{found:#?}");
     }
 }
 
@@ -405,23 +405,23 @@ fn logs_that_cannot_be_fitted_say_why() {
     let empty: [(&str, Vec<f64>); 3] =
         [("time_s", vec![]), ("motor_angle_rad", vec![]), ("torque_nm", vec![])];
     for (log, estimate, expected) in [
-        (Log::from_columns("a.csv", still), "all", "a.csv: column `motor_angle_rad` does not change, record"),
-        (Log::from_columns("f.csv", idle), "all", "f.csv: column `torque_nm` does not change, and tells"),
+        (Log::from_columns("a.csv", still), "all", "a.csv: column `motor_angle_rad` is constant: record"),
+        (Log::from_columns("f.csv", idle), "all", "f.csv: column `torque_nm` is constant and carries"),
         (
             Log::from_columns("b.csv", short),
             "all",
-            "rows in motion are left after filtering at 1.667 Hz and 20",
+            "rows in motion remain after filtering at 1.667 Hz, but 20",
         ),
         (
             Log::from_columns("c.csv", part.clone()),
             "all",
-            "c.csv: a bench log needs `motor_angle_rad`, the file has",
+            "c.csv: a bench log needs `motor_angle_rad`, but the file has",
         ),
         (Log::from_columns("d.csv", empty), "all", "d.csv: 0 rows in motion"),
         (
             Log::from_columns("e.csv", part),
             "mass_kg",
-            "`mass_kg` is not a parameter of this axis, estimate all or",
+            "`mass_kg` is not a parameter of this axis: estimate all or",
         ),
     ] {
         let result =

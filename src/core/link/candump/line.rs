@@ -58,7 +58,7 @@ pub enum LineProblem {
     #[error("the length is a digit from 0 to 8")]
     BadLength,
     /// A number of bytes that is not the length given.
-    #[error("{bytes} bytes are not the {length} that are announced")]
+    #[error("{bytes} bytes do not match the announced length {length}")]
     OtherLength {
         /// Announced.
         length: usize,
@@ -69,7 +69,7 @@ pub enum LineProblem {
     #[error("a length code after _ is a digit from 9 to F and goes with 8 bytes")]
     BadLengthCode,
     /// A CAN XL frame.
-    #[error("CAN XL frames are not read")]
+    #[error("CAN XL frames are not supported")]
     Xl,
     /// Something after the frame that is no direction.
     #[error("after the frame only R or T can stand")]
@@ -83,6 +83,15 @@ pub enum LineProblem {
 ///
 /// # Errors
 /// [`LineError`]: what is wrong and in which column.
+///
+/// ```
+/// use flqr_core::link::candump::{LoggedFrame, parse_line};
+///
+/// let entry = parse_line("(1.500000) can0 141#9C00000000000000")?.ok_or("a blank line")?;
+/// let LoggedFrame::Classic { frame, .. } = entry.frame else { return Err("a CAN FD frame".into()) };
+/// assert_eq!((entry.time.as_secs_f64(), entry.interface, frame.id().raw()), (1.5, "can0", 0x141));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn parse_line(line: &str) -> Result<Option<Entry<'_>>, LineError> {
     let mut words = Words { line, at: 0 };
     let Some(first) = words.next() else { return Ok(None) };

@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 use std::fmt;
 use std::str::FromStr;
 
-use crate::robot::Motor;
+use crate::model::Motor;
 
 /// What a signal can be; forward positive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -105,13 +105,13 @@ pub struct Choice {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ChoiceSyntaxError {
     /// Not of the form.
-    #[error("`{text}` is not of the form QUANTITY=MESSAGE.SIGNAL or QUANTITY=MESSAGE.SIGNAL*FACTOR")]
+    #[error("`{text}` must have the form COLUMN=MESSAGE.SIGNAL or COLUMN=MESSAGE.SIGNAL*FACTOR")]
     Form {
         /// What was given.
         text: String,
     },
     /// No such quantity.
-    #[error("there is no quantity `{name}`: there are {}", names())]
+    #[error("unknown column `{name}`: use one of {}", names())]
     Quantity {
         /// What was given.
         name: String,

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::{Choice, Dbc, Quantity, Signal};
 use crate::link::{FrameId, ImuReading, MotorEvent, MotorState, StampedFrame};
-use crate::robot::Motor;
+use crate::model::Motor;
 
 /// What a frame told.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -65,7 +65,7 @@ pub enum ChoiceError {
         second: String,
     },
     /// A unit that does not tell the factor.
-    #[error("the unit `{unit}` of {signal} does not tell what it is worth as {quantity}: add *FACTOR")]
+    #[error("the unit `{unit}` of {signal} does not determine its scale as {quantity}: add *FACTOR")]
     Unit {
         /// What it was to be.
         quantity: Quantity,
@@ -75,13 +75,13 @@ pub enum ChoiceError {
         unit: String,
     },
     /// Beyond the bytes of a classic frame.
-    #[error("the signal {signal} does not lie within the 8 bytes of a classic CAN frame")]
+    #[error("the signal {signal} is outside the 8 bytes of a classic CAN frame")]
     TooFar {
         /// What was chosen.
         signal: String,
     },
     /// The same quantity twice.
-    #[error("{quantity} is chosen twice: keep one of the two")]
+    #[error("{quantity} is given twice: keep one of the two")]
     Twice {
         /// Which.
         quantity: Quantity,
@@ -135,7 +135,7 @@ impl SignalMap {
         let mut motors = [[None; 2]; 2];
         for source in self.sources.iter().filter(|source| source.id == frame.id()) {
             let value = source.signal.value(&frame).map(|value| value * source.factor);
-            // A float signal may be no number; added up, a single one would stay for good.
+            // A float signal may be no number; added up, a single one would stay permanently.
             let Some(value) = value.filter(|value| value.is_finite()) else { continue };
             match source.quantity {
                 Quantity::Pitch => pitch[0] = Some(value),

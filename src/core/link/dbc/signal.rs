@@ -53,7 +53,7 @@ impl Signal {
         }
     }
 
-    /// Its value in a frame of its message, in its unit; none where the frame is too short or a multiplexor
+    /// Its value in a frame of its message, in its unit; `None` if the frame is too short or a multiplexor
     /// selects others.
     pub fn value(&self, frame: &Frame) -> Option<f64> {
         if frame.kind() != FrameKind::Data || !self.gates.iter().all(|gate| gate.is_open(frame)) {
@@ -138,7 +138,7 @@ impl Place {
         Self { start_bit: signal.start_bit, size: signal.size, order: signal.byte_order, kind }
     }
 
-    /// The bits as a number; none where they are not all there.
+    /// The bits as a number; `None` if they are not all there.
     ///
     /// Bit n is bit n % 8, the lowest first, of byte n / 8. A little-endian signal starts with its lowest bit and
     /// goes up; a big-endian one starts with its highest bit and goes down, and on to bit 7 of the next byte.

@@ -5,7 +5,7 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 
 use super::*;
 use crate::link::{Direction, MotorEvent, StampedFrame};
-use crate::robot::Motor;
+use crate::model::Motor;
 
 const FILE: &str = r#"VERSION "1"
 
@@ -261,9 +261,9 @@ fn wrong_choices_are_named() {
         ("pitch_rad=Pitch", "the messages Imu and Floats both have a signal Pitch: write Imu.Pitch"),
         (
             "pitch_rad=Floats.Pitch",
-            "the unit `furlong` of Floats.Pitch does not tell what it is worth as pitch_rad: add *FACTOR",
+            "the unit `furlong` of Floats.Pitch does not determine its scale as pitch_rad: add *FACTOR",
         ),
-        ("pitch_rad=Far", "the signal Far does not lie within the 8 bytes of a classic CAN frame"),
+        ("pitch_rad=Far", "the signal Far is outside the 8 bytes of a classic CAN frame"),
     ] {
         assert_eq!(refused(text), message);
     }
@@ -276,7 +276,7 @@ fn wrong_choices_are_named() {
     }
     for unknown in ["lean", "pitch_", "motor_speed", "rad", ""] {
         let message = format!("{unknown}=Imu.Pitch").parse::<Choice>().unwrap_err().to_string();
-        let expected = format!("there is no quantity `{unknown}`: there are pitch_rad, ");
+        let expected = format!("unknown column `{unknown}`: use one of pitch_rad, ");
         assert!(message.starts_with(&expected), "{message}");
     }
 }

@@ -21,12 +21,24 @@ pub struct Decoder {
 }
 
 impl Decoder {
-    /// A decoder that has heard nothing.
+    /// A decoder that has received nothing.
     pub fn new() -> Self {
         Self::default()
     }
 
     /// Takes in bytes that have come by `now`.
+    ///
+    /// ```
+    /// use std::time::Duration;
+    ///
+    /// use flqr_core::link::jy901::{Decoder, Packet};
+    ///
+    /// let packet = Packet::angle([0.1, 0.0, 0.0], 0);
+    /// let mut decoder = Decoder::new();
+    /// decoder.push(Duration::ZERO, &[0xFF, 0x00]); // bytes outside of any packet
+    /// decoder.push(Duration::ZERO, &packet.encode());
+    /// assert_eq!(decoder.next(), Some((Duration::ZERO, packet)));
+    /// ```
     pub fn push(&mut self, now: Duration, bytes: &[u8]) {
         for byte in bytes {
             self.window[self.filled] = *byte;
@@ -65,7 +77,7 @@ impl Decoder {
         }
     }
 
-    /// The next intact packet and when its last byte was heard.
+    /// The next intact packet and when its last byte was received.
     #[expect(clippy::should_implement_trait, reason = "none now may be one later: this is no iterator")]
     pub fn next(&mut self) -> Option<(Duration, Packet)> {
         self.ready.pop_front()

@@ -84,7 +84,7 @@ pub enum Reading {
         /// Milliseconds.
         milliseconds: u16,
     },
-    /// Acceleration; at rest, it points up.
+    /// Acceleration; at standstill, it points up.
     Acceleration {
         /// Along x, y, z, in units of g.
         acceleration_g: [f64; 3],
@@ -114,7 +114,7 @@ pub enum Reading {
     },
     /// Attitude.
     Quaternion([f64; 4]),
-    /// Four registers from the one that was asked for on.
+    /// Four registers from the one that was requested on.
     Registers([u16; 4]),
     /// A packet whose words are not interpreted: ports, pressure and GPS.
     Words {
@@ -173,6 +173,18 @@ impl Packet {
     }
 
     /// What it says.
+    ///
+    /// ```
+    /// use flqr_core::link::jy901::{Packet, Reading};
+    ///
+    /// let bytes = Packet::angle([0.1, 0.0, 0.0], 0).encode();
+    /// let packet = Packet::decode(&bytes).ok_or("wrong checksum")?;
+    /// let Reading::Angle { angle_rad: [roll_rad, ..], .. } = packet.reading() else {
+    ///     return Err("not an angle".into());
+    /// };
+    /// assert!((roll_rad - 0.1).abs() < 1e-4);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn reading(&self) -> Reading {
         let [x, y, z, last] = self.words();
         let scaled = |full: f64| [x, y, z].map(|word| f64::from(word) / FULL_SCALE * full);
@@ -199,7 +211,7 @@ fn sum_of(code: u8, data: [u8; 8]) -> u8 {
     data.iter().fold(HEADER.wrapping_add(code), |sum, byte| sum.wrapping_add(*byte))
 }
 
-/// Nearest count of a share of the full scale; what is beyond it stops at its end.
+/// Nearest count of a fraction of the full scale; what is beyond it stops at its end.
 fn count(share: f64) -> i16 {
     (share * FULL_SCALE).round() as i16
 }

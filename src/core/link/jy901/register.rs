@@ -2,7 +2,7 @@
 
 /// Unlocks the registers for 10 s.
 pub const UNLOCK: RegisterWrite = RegisterWrite { register: 0x69, value: 0xB588 };
-/// Keeps the settings for good.
+/// Keeps the settings permanently.
 pub const SAVE: RegisterWrite = RegisterWrite { register: 0x00, value: 0 };
 
 const CONTENT: u8 = 0x02;
@@ -81,19 +81,19 @@ pub fn line_bit_s(packets: u32, rate_hz: f64) -> f64 {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum ConfigureError {
     /// No such rate.
-    #[error("the IMU has no rate of {rate_hz} Hz: it has 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 125 and 200")]
+    #[error("the IMU does not support {rate_hz} Hz: use 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 125 and 200")]
     NoSuchRate {
         /// Asked for, Hz.
         rate_hz: f64,
     },
     /// No such baud rate.
-    #[error("the IMU has no baud rate of {baud}: it has 4800 to 921600, doubling (57600 after 38400)")]
+    #[error("the IMU does not support {baud} baud: use 4800 to 921600, in powers of two (57600 after 38400)")]
     NoSuchBaud {
         /// Asked for.
         baud: u32,
     },
     /// More bits than the line carries.
-    #[error("{needed_bit_s} bit/s do not fit on a line of {baud}: raise the baud rate, or lower the rate")]
+    #[error("{needed_bit_s} bit/s exceed the line rate of {baud}: raise the baud rate, or lower the rate")]
     LineTooSlow {
         /// Needed.
         needed_bit_s: f64,
@@ -107,6 +107,15 @@ pub enum ConfigureError {
 ///
 /// # Errors
 /// [`ConfigureError`].
+///
+/// ```
+/// use flqr_core::link::jy901::{Content, configure};
+///
+/// let commands = configure(200.0, 115_200, Content::BALANCE)?;
+/// assert_eq!(commands[0], [0xFF, 0xAA, 0x69, 0x88, 0xB5]); // unlock
+/// assert!(configure(200.0, 9600, Content::BALANCE).is_err()); // too many bits for the line
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn configure(rate_hz: f64, baud: u32, content: Content) -> Result<Vec<[u8; 5]>, ConfigureError> {
     let rate = code_of(&RATES_HZ, |rate| (rate - rate_hz).abs() < 1e-9);
     let rate = rate.ok_or(ConfigureError::NoSuchRate { rate_hz })?;

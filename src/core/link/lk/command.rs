@@ -1,4 +1,4 @@
-//! What a motor can be told and asked.
+//! What a motor can be determined and asked.
 
 use super::{MotorId, i16_at, i32_at, u16_at};
 use crate::link::Frame;
@@ -100,9 +100,9 @@ pub enum Command {
         /// 0.01°.
         angle_cdeg: i32,
     },
-    /// 0x19: make the present angle zero for good; wears the memory.
+    /// 0x19: make the present angle zero permanently; wears the memory.
     WriteZero,
-    /// 0x91: make this encoder reading zero for good (protocol 2.35); wears the memory.
+    /// 0x91: make this encoder reading zero permanently (protocol 2.35); wears the memory.
     WriteOffset {
         /// Raw.
         offset: u16,
@@ -151,7 +151,7 @@ pub enum ParameterAccess {
     ReadGains = 0x30,
     /// Older: gains, until power is taken off.
     WriteGains = 0x31,
-    /// Older: gains, for good.
+    /// Older: gains, permanently.
     StoreGains = 0x32,
     /// Older: acceleration.
     ReadAcceleration = 0x33,
@@ -179,6 +179,15 @@ impl ParameterAccess {
 
 impl Command {
     /// The frame to this motor.
+    ///
+    /// ```
+    /// use flqr_core::link::lk::{Command, MotorId};
+    ///
+    /// let motor = MotorId::new(1).ok_or("not a motor id")?;
+    /// let frame = Command::TorqueCurrent { iq: 100 }.frame(motor);
+    /// assert_eq!((frame.id().raw(), frame.bytes()), (0x141, &[0xA1, 0, 0, 0, 100, 0, 0, 0][..]));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn frame(&self, motor: MotorId) -> Frame {
         Frame::full(motor.command_id(), self.encode())
     }
@@ -269,7 +278,7 @@ impl Command {
         }
     }
 
-    /// The command that has exactly these bytes; none where one that should be 0 is not, or where a field has no
+    /// The command that has exactly these bytes; `None` if one that should be 0 is not, or where a field has no
     /// such value.
     pub fn decode(bytes: [u8; 8]) -> Option<Self> {
         let command = Self::read(&bytes)?;

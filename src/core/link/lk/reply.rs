@@ -2,7 +2,7 @@
 
 use super::{MotorId, i16_at, u16_at};
 use crate::link::{Frame, MotorErrors};
-use crate::robot::StateLayout;
+use crate::model::StateLayout;
 
 /// One reply of one motor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,7 +16,7 @@ pub enum Reply {
     },
     /// Motion: to 0x9C and to all commands that move the motor.
     State2 {
-        /// Command that it answers; 0xA1 also where torques were asked of all motors at once.
+        /// Command that it answers; 0xA1 also where torques were required of all motors at once.
         command: u8,
         /// What it says.
         state: State2,
@@ -241,7 +241,7 @@ impl State1 {
         }
     }
 
-    /// Whether it is switched on; none where it says neither.
+    /// Whether it is switched on; `None` if it says neither.
     pub fn on(&self) -> Option<bool> {
         match *self {
             Self::Current { power: 0x00, .. } => Some(true),

@@ -3,7 +3,7 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 
 use super::*;
 use crate::link::MotorErrors;
-use crate::robot::StateLayout;
+use crate::model::StateLayout;
 
 fn motor(number: u8) -> MotorId {
     MotorId::new(number).unwrap()

@@ -57,6 +57,15 @@ pub fn bit_rate_of_code(code: u8) -> Option<u32> {
 
 /// How an adapter is opened: closed first, then its bit rate (bit/s), then open, or open for listening. None of a
 /// bit rate that has no code.
+///
+/// ```
+/// use flqr_core::link::slcan::opening;
+///
+/// let commands = opening(1_000_000, true).ok_or("not a bit rate of SLCAN")?;
+/// let lines: Vec<_> = commands.iter().flat_map(|command| command.encode().to_vec()).collect();
+/// assert_eq!(lines, *b"C\rS8\rL\r");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn opening(bit_rate: u32, listen: bool) -> Option<[Command; 3]> {
     let code = BIT_RATES.iter().position(|known| *known == bit_rate)? as u8;
     let open = if listen { Command::Listen } else { Command::Open };
@@ -91,7 +100,7 @@ impl Command {
         })
     }
 
-    /// The command of this line without its end; none where it is not one.
+    /// The command of this line without its end; `None` if it is not one.
     pub fn decode(text: &[u8]) -> Option<Self> {
         let Some((letter, rest)) = text.split_first() else { return Some(Self::Nothing) };
         match (letter, rest) {

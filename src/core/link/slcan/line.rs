@@ -64,7 +64,7 @@ pub struct Text {
 }
 
 impl Text {
-    /// This text; none where it is too long or not printable.
+    /// This text; `None` if it is too long or not printable.
     pub fn new(text: &[u8]) -> Option<Self> {
         let mut bytes = [0; 24];
         bytes.get_mut(..text.len())?.copy_from_slice(text);

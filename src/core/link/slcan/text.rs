@@ -27,7 +27,7 @@ pub(super) fn hex(text: &[u8]) -> Option<u32> {
     (seen & 0xF0 == 0 && !text.is_empty()).then_some(value)
 }
 
-/// A line's frame and what follows it; none where it is not one. The first byte is t, T, r or R.
+/// A line's frame and what follows it; `None` if it is not one. The first byte is t, T, r or R.
 pub(super) fn frame(text: &[u8]) -> Option<(Frame, &[u8])> {
     let (kind, text) = text.split_first()?;
     let (id, text) = match kind {

@@ -1,7 +1,6 @@
 use super::*;
-use crate::link::lk::ReplyId;
-use crate::link::{FrameId, MotorErrors};
-use crate::robot::{StateLayout, Turn};
+use crate::link::{FrameId, MotorErrors, lk::ReplyId};
+use crate::model::{StateLayout, Turn};
 
 fn sixteen_turns() -> LinkSettings {
     LinkSettings { torque_constant_nm_a: Some(0.32), ..LinkSettings::default() }
@@ -214,7 +213,7 @@ enum Told {
     Commanded(u16),
     State(i16),
     Health,
-    Acknowledged(u8),
+    Switched(bool),
     Nothing,
 }
 
@@ -227,7 +226,7 @@ fn told(wheels: &mut Wheels, frame: &StampedFrame, settings: &LinkSettings) -> T
         Some(MotorEvent::Commanded { command, .. }) => Told::Commanded(command),
         Some(MotorEvent::State(_, state)) => Told::State(raw(state.current_a)),
         Some(MotorEvent::Health(..)) => Told::Health,
-        Some(MotorEvent::Acknowledged { command, .. }) => Told::Acknowledged(command),
+        Some(MotorEvent::Switched { on, .. }) => Told::Switched(on),
         Some(other) => panic!("{other:?}"),
     }
 }
@@ -249,7 +248,7 @@ fn a_watcher_tells_commands_from_replies() {
         // The sequence of a controller that switches on, asks and drives; a lost reply, then a lost command.
         let sequence = [
             (0x141, ON, Commanded(0x88)),
-            (back, ON, Acknowledged(0x88)),
+            (back, ON, Switched(true)),
             (0x141, HEALTH, Nothing),
             (back, health, Health),
             (0x141, QUERY, Nothing),
@@ -299,7 +298,7 @@ fn a_cold_motor_at_rest_is_told_from_its_commands() {
     assert_eq!(told(&mut own, &stamped(0.0, Direction::Sent, 0x141, torque(0)), &settings), Nothing);
     assert_eq!(told(&mut own, &received(0.3, 0x141, all_zero), &settings), State(0));
     assert_eq!(told(&mut own, &stamped(1.0, Direction::Sent, 0x141, ON), &settings), Nothing);
-    assert_eq!(told(&mut own, &received(1.3, 0x141, ON), &settings), Acknowledged(0x88));
+    assert_eq!(told(&mut own, &received(1.3, 0x141, ON), &settings), Switched(true));
     assert_eq!(told(&mut own, &received(1.6, 0x141, torque(50)), &settings), Asked(50), "another controller");
 }
 
@@ -346,10 +345,8 @@ fn commands_of_two_kinds_are_answered_apart() {
         }
         let echo: [u8; 8] = frames[0].bytes().try_into().unwrap();
         let events: Vec<_> = wheels.receive(&received(0.25, 0x141, echo)).collect();
-        let [MotorEvent::Acknowledged { motor: Motor::Left, command, .. }] = events[..] else {
-            panic!("{events:?}")
-        };
-        assert_eq!(command, echo[0]);
+        let [MotorEvent::Switched { motor: Motor::Left, on, .. }] = events[..] else { panic!("{events:?}") };
+        assert_eq!(on, echo[0] == 0x88);
     }
 }
 
@@ -444,7 +441,7 @@ fn queries_of_somebody_else_are_no_commands() {
     }
 }
 
-/// An adapter that returns what it sends, some milliseconds later: every reply is heard as without it, and a foreign
+/// An adapter that returns what it sends, some milliseconds later: every reply is received as without it, and a foreign
 /// command is still one.
 #[test]
 fn echoes_of_an_adapter_are_neither_commands_nor_replies() {
@@ -472,7 +469,7 @@ fn echoes_of_an_adapter_are_neither_commands_nor_replies() {
             frames.iter().flat_map(|frame| wheels.receive(frame).collect::<Vec<_>>()).collect();
         let count = |wanted: fn(&MotorEvent) -> bool| events.iter().filter(|event| wanted(event)).count();
         let states = count(|event| matches!(event, MotorEvent::State(..)));
-        let on = count(|event| matches!(event, MotorEvent::Acknowledged { command: 0x88, .. }));
+        let on = count(|event| matches!(event, MotorEvent::Switched { on: true, .. }));
         let foreign = count(|event| matches!(event, MotorEvent::Commanded { .. }));
         assert_eq!((states, on, foreign), (99, 1, 1), "{late_ms} ms");
     }

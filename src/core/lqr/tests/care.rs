@@ -258,7 +258,9 @@ fn numbers_too_far_apart_are_named_and_no_mode_is_blamed() {
     }
     let error = solve(&a, &[0.0, 1e155], &identity, &[1.0]).unwrap_err();
     assert!(
-        error.to_string().starts_with("matrix b has an entry of 1e155, too far from the others"),
+        error
+            .to_string()
+            .starts_with("matrix b has an entry of 1e155, too large or too small compared with the others"),
         "{error}"
     );
 }

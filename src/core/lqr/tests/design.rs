@@ -4,8 +4,8 @@ use nalgebra::{Complex, DMatrix, Matrix2, Matrix4, Matrix4x2};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::lqr::{CareError, CareInput, DesignError, LqrDesign, Weights, design, solve_care};
-use crate::robot::{LinearModel, RobotParameters};
+use crate::lqr::{CareError, CareInput, DesignError, LqrDesign, design, solve_care};
+use crate::model::{LinearModel, RobotParameters, Weights};
 
 fn robot() -> LinearModel {
     RobotParameters {
@@ -152,7 +152,7 @@ fn bad_weights_and_models_are_refused_by_name() {
     }
     assert_eq!(
         edited(&|w| w.q[(0, 0)] = 0.0).to_string(),
-        "not detectable: the mode at 0 does not die out and costs nothing: give x a weight above 0"
+        "not detectable: the mode at 0 is not asymptotically stable and has no cost: give x a weight above 0"
     );
     let motorless = LinearModel { b: Matrix4x2::zeros(), ..robot() };
     let error = design(&motorless, &good).unwrap_err();

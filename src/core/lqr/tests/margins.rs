@@ -5,8 +5,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::lqr::margins::Analysis;
-use crate::lqr::{Margins, SampledLoop, Weights, design, margins};
-use crate::robot::{LinearModel, RobotParameters};
+use crate::lqr::{Margins, SampledLoop, design, margins};
+use crate::model::{LinearModel, RobotParameters, Weights};
 
 const TICK_S: f64 = 0.001;
 

@@ -2,9 +2,9 @@
 
 use nalgebra::Complex;
 
-use crate::lqr::{Placement, SampledLoop, Weights, design, sampled_poles, weights_for_pole};
+use crate::lqr::{Placement, SampledLoop, design, sampled_poles, weights_for_pole};
+use crate::model::{LinearModel, Weights};
 use crate::model_file::presets;
-use crate::robot::LinearModel;
 
 fn robot() -> (LinearModel, SampledLoop) {
     let paper = presets::paper();

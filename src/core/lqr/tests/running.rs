@@ -1,14 +1,12 @@
-//! The loop as it runs against polynomials worked out by hand, the design without a tick, the margins, and the
+//! The loop when sampled against polynomials worked out by hand, the design without a tick, the margins, and the
 //! simulator.
 
 use nalgebra::{Complex, Matrix2x4, Matrix4, Matrix4x2};
 
 use crate::control::{BalanceController, ControllerKind};
-use crate::lqr::{
-    Disturbance, SampledLoop, Weights, damping, design, margins, sampled_poles, sampled_response,
-};
-use crate::model_file::{RobotModel, presets};
-use crate::robot::{Actuation, LinearModel, State, YawHold};
+use crate::lqr::{Disturbance, SampledLoop, damping, design, margins, sampled_poles, sampled_response};
+use crate::model::{Actuation, LinearModel, RobotModel, State, Weights, YawHold};
+use crate::model_file::presets;
 use crate::simulate::{Simulation, SimulationSettings};
 
 const TICK_S: f64 = 0.01;

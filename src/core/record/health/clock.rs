@@ -38,13 +38,13 @@ impl std::fmt::Display for Number {
 fn order(steps: &[f64], findings: &mut Findings) {
     let wrong = steps.iter().filter(|&&step| step <= 0.0).count();
     if wrong > 0 {
-        let problem = format!("time repeats or runs back in {}", rows(wrong));
+        let problem = format!("time repeats or decreases in {}", rows(wrong));
         findings.add(Severity::Error, "time_s", problem, "sort the rows by time and keep one for each time");
     }
 }
 
-/// Unit that a time which rises by so much a row probably has in place of seconds, and what it is in seconds; logs have 10
-/// to 10,000 rows a second.
+/// Unit that a time which rises by so much a row probably has in place of seconds, and what it is in seconds; logs
+/// have 10 to 10,000 rows a second.
 pub(super) fn likely_unit(row_s: f64) -> Option<(&'static str, f64)> {
     match row_s {
         ..0.5 => None,
@@ -57,13 +57,13 @@ pub(super) fn likely_unit(row_s: f64) -> Option<(&'static str, f64)> {
 fn rate(row_s: f64, findings: &mut Findings) {
     let hz = 1.0 / row_s;
     if let Some((unit, factor)) = likely_unit(row_s) {
-        let problem = format!("time rises by {row_s} s a row, as if it were in {unit}");
+        let problem = format!("time increases by {row_s} s per row, as if it were in {unit}");
         findings.warn("time_s", problem, format!("if so, read it with --map time_s=time_s*{factor}"));
     } else if hz < 45.0 {
-        let problem = format!("{:.1} rows a second are too few to see how friction acts", hz);
-        findings.warn("time_s", problem, "record 50 rows a second or more");
+        let problem = format!("{:.1} Hz is too slow to resolve friction", hz);
+        findings.warn("time_s", problem, "record at 50 Hz or more");
     } else if hz > 11_000.0 {
-        let problem = format!("{:.0} rows a second are more than a motor's controller runs at", hz);
+        let problem = format!("{:.0} Hz is faster than a motor controller runs", hz);
         findings.warn("time_s", problem, "check the unit of the time");
     }
 }
@@ -72,16 +72,12 @@ fn jitter(row_s: f64, sorted: &[f64], findings: &mut Findings) {
     let share = |quantile: f64| sorted[(quantile * (sorted.len() - 1) as f64) as usize] / row_s;
     let (low, high) = (share(0.01), share(0.99));
     let problem = format!(
-        "the time between rows jitters: from {:.0} % to {:.0} % of its mean in all but one row of fifty",
+        "jitter: the time between rows is {:.0} % to {:.0} % of its mean in 98 % of the rows",
         100.0 * low,
         100.0 * high
     );
     if high - low > 0.4 {
-        findings.warn(
-            "time_s",
-            problem,
-            "stamp the rows where they are measured, not where they are written",
-        );
+        findings.warn("time_s", problem, "time-stamp the rows at the measurement, not when they are written");
     } else if high - low > 0.05 {
         findings.info("time_s", problem);
     }
@@ -98,6 +94,10 @@ fn gaps(row_s: f64, time: &[f64], findings: &mut Findings) {
             Number(longest[1] - longest[0]),
             Number(longest[0])
         );
-        findings.warn("time_s", problem, "the log is split there; look for lost messages or a busy recorder");
+        findings.warn(
+            "time_s",
+            problem,
+            "the log is split there; check for lost messages or an overloaded recorder",
+        );
     }
 }

@@ -1,4 +1,4 @@
-//! What the motion of a log tells, and what it does not.
+//! Excitation of a log.
 
 use super::{Findings, finite, range};
 use crate::record::{Log, LogKind};
@@ -13,7 +13,7 @@ pub(super) fn check(log: &Log, kind: LogKind, findings: &mut Findings) {
     }
 }
 
-/// How far the axis goes back and forth: the smaller of the two ways by the larger.
+/// Reversal of the motion of an axis: the smaller of the two distances relative to the larger.
 fn directions(log: &Log, position: &str, findings: &mut Findings) {
     let Some(values) = log.column(position) else { return };
     let (mut forth, mut back) = (0.0, 0.0);
@@ -28,7 +28,7 @@ fn directions(log: &Log, position: &str, findings: &mut Findings) {
     if f64::min(forth, back) < 0.02 * f64::max(forth, back) {
         findings.info(
             position,
-            "the motion goes in one direction only: Coulomb friction and offset are not told apart",
+            "the motion has one direction only: Coulomb friction and offset cannot be separated",
         );
     }
 }
@@ -36,7 +36,8 @@ fn directions(log: &Log, position: &str, findings: &mut Findings) {
 fn pairs(log: &Log, findings: &mut Findings) {
     let (Some(speeds), Some(torques)) = (log.column("speed_rad_s"), log.column("torque_nm")) else { return };
     if speeds.len() < 8 {
-        let problem = format!("{} pairs are few for the six parameters of a Stribeck curve", speeds.len());
+        let problem =
+            format!("{} pairs are too few for the six parameters of a Stribeck curve", speeds.len());
         findings.warn("speed_rad_s", problem, "measure at eight speeds or more, in both directions");
     }
     if let Some([low, high]) = range(speeds)
@@ -44,15 +45,15 @@ fn pairs(log: &Log, findings: &mut Findings) {
     {
         findings.info(
             "speed_rad_s",
-            "the speeds have one sign only: Coulomb friction and offset are not told apart",
+            "the speeds have one sign only: Coulomb friction and offset cannot be separated",
         );
     }
     let power: f64 = speeds.iter().zip(torques).map(|(v, t)| v * t).filter(|p| p.is_finite()).sum();
     if power < 0.0 && finite(torques).count() > 0 {
         findings.warn(
             "torque_nm",
-            "most torques act against the speed, as no friction torque of a motor does that keeps its speed",
-            "turn the sign with --map torque_nm=torque_nm*-1",
+            "most torques have the opposite sign of the speed, which is impossible for a motor at constant speed",
+            "change the sign with --map torque_nm=torque_nm*-1",
         );
     }
 }

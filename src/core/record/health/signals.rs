@@ -27,8 +27,10 @@ pub(super) fn check(log: &Log, name: &str, values: &[f64], row_s: Option<f64>, f
     let held = usual_run(values);
     if let (2.., Some(row_s)) = (held, row_s) {
         let hz = 1.0 / (held as f64 * row_s);
-        findings
-            .info(name, format!("each value is held for {held} rows, fresh about {hz:.0} times a second"));
+        findings.info(
+            name,
+            format!("each value is held for {held} rows; the sensor updates at about {hz:.0} Hz"),
+        );
     }
     if measured {
         steps(name, values, high - low, findings);
@@ -73,7 +75,7 @@ fn steps(name: &str, values: &[f64], range: f64, findings: &mut Findings) {
     if differences().filter(whole).count() * 10 < all * 9 {
         return;
     }
-    let text = format!("the values come in steps of about {step:.3e}, {count:.0} over their range");
+    let text = format!("the resolution is about {step:.3e}, {count:.0} steps over the range");
     if count < 20.0 && all > 100 {
         findings.warn(name, text, "use a finer sensor or a larger motion");
     } else {
@@ -93,10 +95,10 @@ fn saturation(name: &str, values: &[f64], [low, high]: [f64; 2], held: usize, fi
     let varies = changes * 10 > values.len() / held;
     if varies && flat * 200 > values.len() {
         let problem = format!(
-            "{:.1} % of the rows stay at the limits {low} and {high}: the value is cut off there",
+            "{:.1} % of the rows are at the limits {low} and {high}: the value is saturated",
             100.0 * flat as f64 / values.len() as f64
         );
-        findings.warn(name, problem, "record the torque that really acts, or with less torque");
+        findings.warn(name, problem, "record the actual torque, or record with less torque");
     }
 }
 
@@ -117,7 +119,7 @@ fn wraps(name: &str, values: &[f64], findings: &mut Findings) {
     let inside = finite(values).all(|angle| angle.abs() < 1.1 * TAU);
     if wrapped > 0 && inside {
         let times = if wrapped == 1 { "once".to_owned() } else { format!("{wrapped} times") };
-        let problem = format!("the angle jumps by a whole turn {times}: it is given within one turn");
-        findings.warn(name, problem, "write the angle counted over turns");
+        let problem = format!("the angle jumps by a whole turn {times}: it wraps within one turn");
+        findings.warn(name, problem, "record the unwrapped angle");
     }
 }

@@ -20,16 +20,18 @@ pub(super) fn check(log: &Log, name: &str, row_s: f64, findings: &mut Findings) 
         Some(line) => format!("{} s, line {line}", time[first]),
         None => format!("{} s", time[first]),
     };
-    let (problem, mend) = match found.len() {
-        1 => (format!("one value is {off:.4e} off the rows around it, at {place}"), "remove the row"),
+    let (problem, remedy) = match found.len() {
+        1 => {
+            (format!("one value differs by {off:.4e} from the rows around it, at {place}"), "remove the row")
+        }
         count => (
             format!(
-                "{count} single values are far off the rows around them, the first by {off:.4e} at {place}"
+                "{count} single values differ widely from the rows around them, the first by {off:.4e} at {place}"
             ),
             "remove these rows",
         ),
     };
-    findings.warn(name, problem, mend);
+    findings.warn(name, problem, remedy);
 }
 
 /// Rows that are far off the rows around them, and how far.
@@ -52,7 +54,7 @@ fn spikes(time: &[f64], values: &[f64], row_s: f64) -> Vec<(usize, f64)> {
     (0..off.len()).filter(spike).map(|index| (index + 1, off[index])).collect()
 }
 
-/// How far the middle one of three rows is off the line through the others; 0 where it cannot be told.
+/// Deviation of the middle one of three rows from the line through the others; 0 if undefined.
 fn deviation(time: &[f64], values: &[f64]) -> f64 {
     let share = (time[1] - time[0]) / (time[2] - time[0]);
     let off = values[1] - values[0] - share * (values[2] - values[0]);

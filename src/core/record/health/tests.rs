@@ -40,16 +40,10 @@ fn a_log_without_faults_has_infos_only() {
 fn each_fault_is_named_with_its_column_and_mend() {
     use Severity::{Error, Info, Warning};
     let bench = bench();
-    for (log, severity, column, problem, mend) in [
+    for (log, severity, column, problem, remedy) in [
         (with(&bench, "time_s", |_, t| 1000.0 * t), Warning, "time_s", "in milliseconds", "time_s*0.001"),
-        (with(&bench, "time_s", |_, t| 30.0 * t), Warning, "time_s", "too few", "50 rows a second"),
-        (
-            with(&bench, "time_s", |_, t| t / 20.0),
-            Warning,
-            "time_s",
-            "20000 rows a second are more",
-            "unit of",
-        ),
+        (with(&bench, "time_s", |_, t| 30.0 * t), Warning, "time_s", "too slow to resolve", "50 Hz"),
+        (with(&bench, "time_s", |_, t| t / 20.0), Warning, "time_s", "20000 Hz is faster", "unit of"),
         (
             with(&bench, "time_s", |row, t| t - 0.01 * f64::from(row == 50)),
             Error,
@@ -68,7 +62,7 @@ fn each_fault_is_named_with_its_column_and_mend() {
             with(&bench, "time_s", |row, t| t + 4e-4 * (row % 2) as f64),
             Warning,
             "time_s",
-            "jitters: from 60 % to 140 %",
+            "jitter: the time between rows is 60 % to 140 %",
             "stamp",
         ),
         (
@@ -117,7 +111,7 @@ fn each_fault_is_named_with_its_column_and_mend() {
             with(&bench, "torque_nm", |_, t| (t * 1000.0).round()),
             Warning,
             "torque_nm",
-            "whole number",
+            "is an integer",
             "FACTOR in N m",
         ),
         (
@@ -131,10 +125,16 @@ fn each_fault_is_named_with_its_column_and_mend() {
             with(&bench, "torque_nm", |_, t| t.clamp(-0.08, 0.08)),
             Warning,
             "torque_nm",
-            "stay at the limits -0.08 and 0.08",
+            "are at the limits -0.08 and 0.08",
             "less torque",
         ),
-        (with(&bench, "torque_nm", |_, _| 0.0), Warning, "torque_nm", "0 throughout", "connected"),
+        (
+            with(&bench, "torque_nm", |_, _| 0.0),
+            Warning,
+            "torque_nm",
+            "the value is 0 throughout",
+            "connected",
+        ),
         (with(&bench, "torque_nm", |_, _| f64::NAN), Warning, "torque_nm", "no number", "record it again"),
         (
             with(&bench, "torque_nm", |row, t| if row == 7 { f64::NAN } else { t }),
@@ -147,7 +147,7 @@ fn each_fault_is_named_with_its_column_and_mend() {
             with(&bench, "torque_nm", |_, t| (t * 50.0).round() / 50.0),
             Warning,
             "torque_nm",
-            "steps of about 2.000e-2",
+            "the resolution is about 2.000e-2",
             "finer sensor",
         ),
         (
@@ -155,7 +155,7 @@ fn each_fault_is_named_with_its_column_and_mend() {
             Warning,
             "motor_angle_rad",
             "by a whole turn",
-            "counted over turns",
+            "unwrapped angle",
         ),
         (
             with(&bench, "motor_angle_rad", |row, _| row as f64 * 0.01),
@@ -169,7 +169,7 @@ fn each_fault_is_named_with_its_column_and_mend() {
         let fits = |f: &&HealthFinding| {
             (f.severity, f.column.as_str()) == (severity, column)
                 && f.problem.contains(problem)
-                && f.mend.contains(mend)
+                && f.remedy.contains(remedy)
         };
         assert!(findings.iter().any(|f| fits(&f)), "{problem}: {findings:#?}");
         let worse = findings.iter().filter(|f| f.severity > severity).count();
@@ -184,29 +184,29 @@ fn the_map_of_a_unit_goes_to_the_column_that_is_off() {
         let log = with(&log, "motor_speed_rad_s", |_, w| w * speed);
         let findings = data_health(&log);
         let warnings = findings.iter().filter(|f| f.severity > Severity::Info);
-        warnings.map(|f| (f.problem.clone(), f.mend.clone())).collect::<Vec<_>>()
+        warnings.map(|f| (f.problem.clone(), f.remedy.clone())).collect::<Vec<_>>()
     };
     let (degrees, rpm) = (180.0 / PI, 30.0 / PI);
-    let [(_, mend)] = &unit(degrees, 1.0)[..] else { panic!("one finding") };
-    assert_eq!(mend, "if so, read it with --map motor_angle_rad=motor_angle_rad*0.0174533");
-    let [(_, mend)] = &unit(1.0, degrees)[..] else { panic!("one finding") };
-    assert_eq!(mend, "if so, read it with --map motor_speed_rad_s=motor_speed_rad_s*0.0174533");
-    let [(problem, mend)] = &unit(degrees, rpm)[..] else { panic!("one finding") };
+    let [(_, remedy)] = &unit(degrees, 1.0)[..] else { panic!("one finding") };
+    assert_eq!(remedy, "if so, read it with --map motor_angle_rad=motor_angle_rad*0.0174533");
+    let [(_, remedy)] = &unit(1.0, degrees)[..] else { panic!("one finding") };
+    assert_eq!(remedy, "if so, read it with --map motor_speed_rad_s=motor_speed_rad_s*0.0174533");
+    let [(problem, remedy)] = &unit(degrees, rpm)[..] else { panic!("one finding") };
     assert!(problem.contains("revolutions per minute against a position in degrees or a gear"), "{problem}");
     let both =
         "--map motor_angle_rad=motor_angle_rad*0.0174533 --map motor_speed_rad_s=motor_speed_rad_s*0.1047198";
-    assert!(mend.contains(both), "{mend}");
-    let [(problem, mend)] = &unit(1.0 / (2.0 * PI), rpm)[..] else { panic!("one finding") };
+    assert!(remedy.contains(both), "{remedy}");
+    let [(problem, remedy)] = &unit(1.0 / (2.0 * PI), rpm)[..] else { panic!("one finding") };
     assert!(problem.contains("against a position in revolutions"), "{problem}");
-    assert!(mend.contains("motor_angle_rad*6.2831853 --map motor_speed_rad_s=motor_speed_rad_s*0.1047198"));
-    let [(_, mend)] = &unit(1.0, 3.0)[..] else { panic!("one finding") };
+    assert!(remedy.contains("motor_angle_rad*6.2831853 --map motor_speed_rad_s=motor_speed_rad_s*0.1047198"));
+    let [(_, remedy)] = &unit(1.0, 3.0)[..] else { panic!("one finding") };
     assert!(
-        mend.contains("if the position is right, --map motor_speed_rad_s=motor_speed_rad_s*0.33"),
-        "{mend}"
+        remedy.contains("if the position is right, --map motor_speed_rad_s=motor_speed_rad_s*0.33"),
+        "{remedy}"
     );
     let other = "; if the speed is right, --map motor_angle_rad=motor_angle_rad*";
-    let factor: f64 = mend.split(other).nth(1).unwrap().parse().unwrap();
-    assert!((factor - 3.0).abs() < 0.05, "{mend}");
+    let factor: f64 = remedy.split(other).nth(1).unwrap().parse().unwrap();
+    assert!((factor - 3.0).abs() < 0.05, "{remedy}");
 }
 
 /// A time in another unit is told once, and a speed that is off besides keeps its own finding.
@@ -216,9 +216,9 @@ fn a_time_in_another_unit_is_no_fault_of_the_speed() {
         let log = with(&bench(), "time_s", |_, t| t * unit);
         let findings = data_health(&log);
         let warnings: Vec<&HealthFinding> = findings.iter().filter(|f| f.severity > Severity::Info).collect();
-        let mend = format!("--map time_s=time_s*{factor}");
+        let remedy = format!("--map time_s=time_s*{factor}");
         assert!(
-            matches!(warnings[..], [time] if time.column == "time_s" && time.mend.ends_with(&mend)),
+            matches!(warnings[..], [time] if time.column == "time_s" && time.remedy.ends_with(&remedy)),
             "{warnings:#?}"
         );
         let findings = data_health(&with(&log, "motor_speed_rad_s", |_, w| w * 180.0 / PI));
@@ -249,9 +249,9 @@ fn a_single_spike_in_position_is_found_with_its_time() {
         let warnings: Vec<&HealthFinding> = findings.iter().filter(|f| f.severity > Severity::Info).collect();
         let [spike] = warnings[..] else { panic!("{row} {size}: {warnings:#?}") };
         assert_eq!(spike.column, "motor_angle_rad");
-        assert!(spike.problem.starts_with("one value is "), "{spike:?}");
+        assert!(spike.problem.starts_with("one value differs by "), "{spike:?}");
         assert!(spike.problem.ends_with(&format!(", at {} s", row as f64 * 1e-3)), "{spike:?}");
-        assert_eq!(spike.mend, "remove the row");
+        assert_eq!(spike.remedy, "remove the row");
     }
     let slow = with(&bench, "motor_angle_rad", |row, q| 0.1 * q + 2.0 * PI * f64::from(row == 700));
     assert!(data_health(&slow).iter().all(|f| !f.problem.contains("whole turn")));
@@ -275,7 +275,7 @@ fn columns_held_by_a_slower_sensor_are_told() {
     let torque = bench.column("torque_nm").unwrap().to_vec();
     let held = with(&bench, "torque_nm", |row, _| torque[row / 10 * 10]);
     let findings = data_health(&held);
-    let expected = "each value is held for 10 rows, fresh about 100 times a second";
+    let expected = "each value is held for 10 rows; the sensor updates at about 100 Hz";
     assert!(findings.iter().any(|f| f.column == "torque_nm" && f.problem == expected), "{findings:#?}");
 }
 
@@ -288,7 +288,7 @@ fn a_pitch_in_degrees_is_suspected() {
     let findings = data_health(&log);
     let pitch = findings.iter().find(|f| f.severity == Severity::Warning && f.column == "pitch_rad").unwrap();
     assert_eq!(pitch.problem, "values up to 12.0000 look like degrees");
-    assert_eq!(pitch.mend, "if so, read it with --map pitch_rad=pitch_rad*0.0174533");
+    assert_eq!(pitch.remedy, "if so, read it with --map pitch_rad=pitch_rad*0.0174533");
     // And the columns that a robot log needs besides are missing.
     assert_eq!(findings[0].severity, Severity::Error);
     assert!(findings[0].problem.starts_with("a robot log needs `x_m`, `x_dot_m_s`"), "{findings:#?}");
@@ -302,8 +302,8 @@ fn pairs_of_friction_are_judged_without_a_clock() {
         Log::from_columns("p.csv", [("speed_rad_s", speeds.to_vec()), ("torque_nm", torques)])
     };
     assert_eq!(data_health(&pairs(1.0, &speeds)), []);
-    assert!(data_health(&pairs(-1.0, &speeds))[0].mend.contains("torque_nm=torque_nm*-1"));
-    assert!(data_health(&pairs(1.0, &speeds[..5]))[0].problem.contains("5 pairs are few"));
+    assert!(data_health(&pairs(-1.0, &speeds))[0].remedy.contains("torque_nm=torque_nm*-1"));
+    assert!(data_health(&pairs(1.0, &speeds[..5]))[0].problem.contains("5 pairs are too few"));
     assert!(data_health(&pairs(1.0, &speeds[10..]))[0].problem.contains("one sign only"));
 }
 
@@ -323,7 +323,7 @@ fn dropped_rows_are_never_silent() {
     assert_eq!(found.severity, Severity::Warning);
     assert_eq!(
         found.problem,
-        "2 cells or rows could not be used and 1 of 4001 rows was dropped, the first at line 7, column \
+        "2 cells or rows could not be used and 1 of 4001 rows was skipped, the first at line 7, column \
          `torque_nm`: bad"
     );
 }
@@ -338,7 +338,7 @@ fn one_is_written_as_one() {
     };
     let findings = data_health(&log);
     let told = |text: &str| findings.iter().any(|f| f.problem.starts_with(text));
-    assert!(told("1 cell or row could not be used and 1 of 4001 rows was dropped"), "{findings:#?}");
+    assert!(told("1 cell or row could not be used and 1 of 4001 rows was skipped"), "{findings:#?}");
     assert!(told("1 row a second over 3999"), "{findings:#?}");
 }
 
@@ -406,7 +406,7 @@ fn oddities_of_measured_logs_are_found() {
     let laas = ["motor_angle_rad=angle_rad", "motor_speed_rad_s=speed_rad_s", "torque_nm=current_a"];
     for (name, column, problem) in [
         ("laas_bldc/acc_current.csv", "time_s", "gaps of more than five rows"),
-        ("laas_bldc/acc_current.csv", "time_s", "jitters"),
+        ("laas_bldc/acc_current.csv", "time_s", "jitter: "),
         ("laas_bldc/rolling_data1.csv", "motor_angle_rad", "one direction only"),
         ("go1_pendulum/go1_m1kg_sin_sin.csv", "motor_speed_rad_s", "the speed is 0.15"),
     ] {

@@ -30,14 +30,14 @@ const MAGNITUDES: [(&str, f64, &str, f64); 8] = [
 
 /// A unit in which a position, a speed or both are off.
 struct Scale {
-    /// What the speed is then by the change of the position.
+    /// Ratio of the speed to the derivative of the position.
     factor: f64,
     meaning: &'static str,
-    /// What the position is multiplied with to mend it.
+    /// Factor that corrects the position.
     position: f64,
-    /// What the speed is multiplied with to mend it.
+    /// Factor that corrects the speed.
     speed: f64,
-    /// Whether gears of about this ratio are common too.
+    /// True if gears of about this ratio are common too.
     or_gear: bool,
 }
 
@@ -86,8 +86,8 @@ pub(super) fn check(log: &Log, row_s: Option<f64>, findings: &mut Findings) {
         let magnitude = log.column(name).and_then(range).map_or(0.0, |[low, high]| high.abs().max(low.abs()));
         if magnitude > largest {
             let problem = format!("values up to {magnitude:.4} look like {looks_like}");
-            let mend = format!("if so, read it with --map {name}={name}*{factor:.7}");
-            findings.warn(name, problem, mend);
+            let remedy = format!("if so, read it with --map {name}={name}*{factor:.7}");
+            findings.warn(name, problem, remedy);
         }
     }
     for name in ["torque_nm", "torque_left_nm", "torque_right_nm"] {
@@ -99,8 +99,8 @@ fn whole_numbers(log: &Log, name: &str, findings: &mut Findings) {
     let Some(values) = log.column(name) else { return };
     let large = finite(values).any(|value| value.abs() >= 10.0);
     if large && values.len() > 20 && finite(values).all(|value| value.fract() == 0.0) {
-        let mend = format!("if so, read it with --map {name}={name}*FACTOR, FACTOR in N m a count");
-        findings.warn(name, "every value is a whole number, as raw counts or milliamperes are", mend);
+        let remedy = format!("if so, read it with --map {name}={name}*FACTOR, FACTOR in N m per count");
+        findings.warn(name, "every value is an integer, like raw counts or milliamperes", remedy);
     }
 }
 
@@ -124,12 +124,12 @@ fn derivative(
     let scales = if position.ends_with("_rad") { &ANGULAR[..] } else { &LINEAR[..] };
     let off = |scale: &Scale| (factor / scale.factor - 1.0).abs();
     let close = scales.iter().filter(|scale| off(scale) < 0.06).min_by(|a, b| off(a).total_cmp(&off(b)));
-    let (looks_like, mend) = match close {
+    let (looks_like, remedy) = match close {
         Some(scale) => {
             let maps = [(position, scale.position), (speed, scale.speed)];
             let maps = maps.into_iter().filter(|(_, factor)| *factor != 1.0);
             let maps = maps.map(|(name, factor)| map(name, factor)).collect::<Vec<_>>().join(" ");
-            let gear = format!("; if a gear is between them, {}", map(speed, 1.0 / factor));
+            let gear = format!("; with a gear between them, {}", map(speed, 1.0 / factor));
             let (or_gear, gear) = if scale.or_gear { (" or a gear", gear.as_str()) } else { ("", "") };
             (format!("it looks like {}{or_gear}", scale.meaning), format!("if so, read it with {maps}{gear}"))
         }
@@ -140,12 +140,13 @@ fn derivative(
                 "one of them has another scale, such as a gear ratio"
             };
             let (of_speed, of_position) = (map(speed, 1.0 / factor), map(position, factor));
-            let mend = format!("if the position is right, {of_speed}; if the speed is right, {of_position}");
-            (what.to_owned(), mend)
+            let remedy =
+                format!("if the position is right, {of_speed}; if the speed is right, {of_position}");
+            (what.to_owned(), remedy)
         }
     };
-    let problem = format!("the speed is {factor:.4} times the change of `{position}`: {looks_like}");
-    out.warn(speed, problem, mend);
+    let problem = format!("the speed is {factor:.4} times the derivative of `{position}`: {looks_like}");
+    out.warn(speed, problem, remedy);
     true
 }
 

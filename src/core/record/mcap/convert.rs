@@ -23,7 +23,7 @@ pub struct Input<'a, R> {
     pub reader: R,
 }
 
-/// What came of a conversion.
+/// Outcome of a conversion.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Conversion {
     /// Number of messages on each topic.
@@ -34,14 +34,14 @@ pub struct Conversion {
     pub problems: Vec<String>,
 }
 
-/// Why files could not be converted.
+/// Reason why files could not be converted.
 #[derive(Debug, thiserror::Error)]
 pub enum ConvertError {
     /// One of the files cannot be read.
     #[error(transparent)]
     Read(#[from] LogError),
     /// Two files have the same columns.
-    #[error("{first} and {second} both have `{topic}`: convert them one by one")]
+    #[error("{first} and {second} both have `{topic}`: convert them separately")]
     SameTopic {
         /// The topic.
         topic: String,
@@ -94,7 +94,7 @@ struct Track<'a, R> {
     head: Option<(Duration, Head)>,
     /// Values of the row at the head.
     row: Vec<f64>,
-    /// What its time counts from.
+    /// Time zero.
     start: Duration,
     topics: Vec<Topic>,
 }

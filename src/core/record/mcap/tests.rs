@@ -136,7 +136,7 @@ fn files_that_cannot_be_one_are_refused() {
     let go_on = &mut |_| ControlFlow::Continue(());
     let twice = vec![input("a.csv", "/log", LOG), input("b.csv", "/log", LOG)];
     let error = convert(twice, &ColumnMap::default(), Vec::new(), go_on).unwrap_err();
-    assert_eq!(error.to_string(), "a.csv and b.csv both have `/state`: convert them one by one");
+    assert_eq!(error.to_string(), "a.csv and b.csv both have `/state`: convert them separately");
     let nonsense = vec![input("run.log", "", "(no frames here\n(nor here\n")];
     let error = convert(nonsense, &ColumnMap::default(), Vec::new(), go_on).unwrap_err();
     assert!(
@@ -154,7 +154,7 @@ fn frames_that_run_back_in_time_are_a_problem_of_the_file() {
     let (_, conversion) = converted(vec![input("run.log", "/log", frames)]);
     assert_eq!((conversion.topics["/can/can0"], conversion.dropped), (3, 0));
     assert!(
-        conversion.problems[0].starts_with("run.log: line 2: time runs back by 1.000 s"),
+        conversion.problems[0].starts_with("run.log: line 2: time decreases by 1.000 s"),
         "{conversion:?}"
     );
 }
@@ -163,7 +163,7 @@ fn frames_that_run_back_in_time_are_a_problem_of_the_file() {
 fn damage_is_counted_and_its_first_place_named() {
     let text = FRAMES.to_owned() + "(170";
     let (_, done) = converted(vec![input("run.log", "", &text)]);
-    let problem = "run.log: line 4: the recording was cut off in this line, it was left out";
+    let problem = "run.log: line 4: the recording ends in the middle of this line, which was skipped";
     assert_eq!((done.dropped, done.problems), (1, vec![problem.to_owned()]));
 }
 

@@ -25,7 +25,7 @@ const LIBRARY: &str = "flqr ";
 /// Bytes up to that name: magic, opcode, length of the record, empty profile, length of the name.
 const BEFORE_LIBRARY: usize = 8 + 1 + 8 + 4 + 4;
 
-/// Whether a file that begins with these bytes was written by flqr.
+/// Returns whether a file that begins with these bytes was written by flqr.
 pub fn is_opening(bytes: &[u8]) -> bool {
     let library = bytes.get(BEFORE_LIBRARY..BEFORE_LIBRARY + LIBRARY.len());
     bytes.starts_with(::mcap::MAGIC) && library == Some(LIBRARY.as_bytes())
@@ -88,7 +88,7 @@ impl<W: Write> McapWriter<W> {
         self.write(time, &format!("/can/{interface}"), topics::frame)
     }
 
-    /// What a packet of the IMU measured, if it did.
+    /// Returns the measurement of an IMU packet, if any.
     pub(super) fn packet(&mut self, time: Duration, packet: &Packet) -> io::Result<()> {
         let Some((topic, fields, values)) = topics::of_packet(packet) else { return Ok(()) };
         self.numbers(time, topic, fields, values.into_iter())

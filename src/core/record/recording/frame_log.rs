@@ -83,7 +83,7 @@ impl<'a, R: BufRead> FrameLog<'a, R> {
                     self.latest = self.latest.max(frame.time);
                     if back > OUT_OF_ORDER {
                         let problem = format!(
-                            "time runs back by {:.3} s: sort the lines by time, or split the file where the clock was set back",
+                            "time decreases by {:.3} s: sort the lines by time, or split the file at the clock change",
                             back.as_secs_f64()
                         );
                         let (line, column) = (self.number, String::new());
@@ -111,12 +111,13 @@ impl<'a, R: BufRead> FrameLog<'a, R> {
             match (count, ended) {
                 (0, _) => return Ok(false),
                 (_, true) if too_long => {
-                    self.complain("the line is too long for a frame, it was left out".to_owned())
+                    self.complain("the line is too long for a frame and was skipped".to_owned())
                 }
                 (_, true) if self.line.trim_ascii().is_empty() => {}
                 (_, true) => return Ok(true),
                 (LINE_LIMIT_BYTES, false) => {}
-                _ => self.complain("the recording was cut off in this line, it was left out".to_owned()),
+                _ => self
+                    .complain("the recording ends in the middle of this line, which was skipped".to_owned()),
             }
             too_long = !ended;
         }
@@ -137,7 +138,7 @@ impl<'a, R: BufRead> FrameLog<'a, R> {
         self.first_problem.get_or_insert(LineProblem { line, column, problem });
     }
 
-    /// Whether there was a frame at all.
+    /// Returns whether there was a frame at all.
     fn end(&self) -> Result<(), LogError> {
         match &self.first_problem {
             Some(first) if self.frames == 0 => Err(LogError::MostlyBad {
@@ -153,12 +154,12 @@ impl<'a, R: BufRead> FrameLog<'a, R> {
 
 /// The interface and the frame of a line that is not blank.
 fn parse(line: &[u8]) -> Result<(&str, StampedFrame), String> {
-    let left_out = |problem: &dyn Display| format!("{problem}, the line was left out");
+    let left_out = |problem: &dyn Display| format!("{problem}; the line was skipped");
     let text = std::str::from_utf8(line).map_err(|_| left_out(&"this is not text"))?;
     let entry = candump::parse_line(text).map_err(|error| left_out(&error))?;
     let Entry { time, interface, frame, direction } = entry.ok_or_else(|| left_out(&"there is no frame"))?;
     let LoggedFrame::Classic { frame, .. } = frame else {
-        return Err(left_out(&"CAN FD frames are not the robot's"));
+        return Err(left_out(&"CAN FD frames are not supported"));
     };
     Ok((interface, StampedFrame { time, direction: direction.unwrap_or(Direction::Received), frame }))
 }
@@ -248,7 +249,7 @@ mod tests {
         let (count, damaged, problem) = read(&lines(&["500000", "900000", "250000", "300000", "950000"]));
         let problem = problem.unwrap();
         assert_eq!((count, damaged), (5, 0));
-        assert!(problem.starts_with("line 3: time runs back by 0.650 s: sort"), "{problem}");
+        assert!(problem.starts_with("line 3: time decreases by 0.650 s: sort"), "{problem}");
     }
 
     #[test]

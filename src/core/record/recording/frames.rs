@@ -14,7 +14,7 @@ pub fn push_frame(text: &mut String, start: Duration, interface: &str, frame: &S
     candump::write_line(text, &Entry { time: start + time, interface, frame: frame.into(), direction });
 }
 
-/// Adds a packet of the IMU, heard at `time` since `start`.
+/// Adds a packet of the IMU, received at `time` since `start`.
 pub fn push_imu_packet(text: &mut String, start: Duration, time: Duration, packet: &Packet) {
     let frame = Frame::full(FrameId::Standard(u16::from(packet.kind.code())), packet.data);
     push_frame(text, start, IMU_INTERFACE, &StampedFrame { time, direction: Direction::Received, frame });

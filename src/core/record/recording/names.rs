@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::robot::Motor;
+use crate::model::Motor;
 
 /// Names of a recording's files.
 #[derive(Clone, Debug, PartialEq, Eq)]

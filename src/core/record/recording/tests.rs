@@ -3,8 +3,8 @@ use std::path::Path;
 use std::time::Duration;
 
 use super::*;
+use crate::model::Motor;
 use crate::record::{BenchSample, ColumnMap, Log, LogKind, ReadOptions, Sample, read_log};
-use crate::robot::Motor;
 
 fn about() -> About {
     let start = Duration::new(1_763_726_400, 123_456_789);
@@ -109,7 +109,7 @@ fn a_recording_cut_anywhere_loses_its_torn_line_only() {
         let found = read(text);
         if rows == 0 {
             let message = found.unwrap_err().to_string();
-            assert!(message.contains("no row of numbers") || message.contains("cut off"), "{message}");
+            assert!(message.contains("no row of numbers") || message.contains("in the middle"), "{message}");
             continue;
         }
         let log = found.unwrap();
@@ -122,7 +122,7 @@ fn a_recording_cut_anywhere_loses_its_torn_line_only() {
     let torn = read(&whole[..whole.len() - 1]).unwrap();
     assert_eq!(
         torn.problems[0].to_string(),
-        "line 10: the recording was cut off in this row, it was dropped"
+        "line 10: the recording ends in the middle of this row, which was skipped"
     );
 }
 

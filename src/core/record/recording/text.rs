@@ -4,14 +4,13 @@ use std::fmt::Write;
 use std::time::Duration;
 
 use super::{FIRST_LINE, OPTIONAL_COLUMNS};
-use crate::record::write::push_number;
-use crate::record::{BenchSample, Sample};
-use crate::robot::Motor;
+use crate::model::Motor;
+use crate::record::{BenchSample, Sample, write::push_number};
 
-/// What a recording is of.
+/// Source of a recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct About {
-    /// Where the frames come from, as the user named it.
+    /// Source of the frames, as named by the user.
     pub source: String,
     /// Interface under which the frames are written, such as `can0`.
     pub interface: String,
@@ -22,7 +21,7 @@ pub struct About {
 /// A row of a recording's robot log.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Row {
-    /// What was measured and asked for.
+    /// Measured and commanded signals.
     pub sample: Sample,
     /// Newest temperature of the left and the right motor, °C.
     pub motor_temperature_c: [Option<f64>; 2],
@@ -45,12 +44,12 @@ impl From<Sample> for Row {
     }
 }
 
-/// What stands above the rows of the robot log.
+/// Header of the robot log.
 pub fn robot_header(about: &About) -> String {
     header("robot log", about, Row::columns())
 }
 
-/// What stands above the rows of a motor's bench log.
+/// Header of a motor's bench log.
 pub fn bench_header(about: &About, motor: Motor) -> String {
     header(&format!("bench log of the {motor} motor"), about, BenchSample::COLUMNS.into_iter())
 }
@@ -62,7 +61,7 @@ fn header(kind: &str, about: &About, columns: impl Iterator<Item = &'static str>
     format!("{FIRST_LINE}: {kind} of {source}\n{START}{seconds}.{micros:06} s after 1970\n{columns}\n")
 }
 
-/// What the comment with the start of a recording begins with.
+/// First words of the comment with the start time of a recording.
 const START: &str = "# time_s counts from ";
 
 /// Start of a recording since 1970, if this comment of its log says so.
@@ -101,7 +100,7 @@ pub fn push_event(text: &mut String, time: Duration, what: &str) {
     written.expect("writing to a string cannot fail");
 }
 
-/// What happened and when, if this comment of a recording's log says so.
+/// Returns the event and its time from a comment of a recording.
 pub fn parse_event(comment: &str) -> Option<(Duration, &str)> {
     let (time, what) = comment.strip_prefix("# ")?.split_once(" s ")?;
     Some((Duration::try_from_secs_f64(time.parse().ok()?).ok()?, what))

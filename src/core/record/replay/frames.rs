@@ -12,7 +12,7 @@ use crate::record::recording::{FrameLog, IMU_INTERFACE, imu_packet};
 /// back by more than this, the clock was set back or another recording begins.
 const OUT_OF_ORDER: Duration = Duration::from_secs(1);
 
-/// Frames and packets of a candump file, in its order, which is the one in which they were heard.
+/// Frames and packets of a candump file, in its order, which is the one in which they were received.
 pub(super) struct FrameTrack<R> {
     name: String,
     log: FrameLog<'static, R>,

@@ -30,7 +30,7 @@ pub struct ReplayFile<R> {
     pub reader: R,
 }
 
-/// What a recording holds.
+/// Contents of a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ReplayItem {
     /// A row of the robot log.
@@ -43,7 +43,7 @@ pub enum ReplayItem {
     Event(String),
 }
 
-/// How much was played.
+/// Amount played.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ReplayCounts {
     /// Rows of the robot log.
@@ -54,7 +54,7 @@ pub struct ReplayCounts {
     pub damaged: u64,
 }
 
-/// Why a recording cannot be played.
+/// Reason why a recording cannot be played.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ReplayError {
     /// A file of it cannot be read.
@@ -62,7 +62,7 @@ pub enum ReplayError {
     Read(#[from] LogError),
     /// A log of another kind.
     #[error(
-        "{file} is no {}, it has no `{missing}`: give the robot log (.csv) or the raw frames (.log) of a recording",
+        "{file} is not a {}, because it has no `{missing}`: give the robot log (.csv) or the raw frames (.log) of a recording",
         LogKind::Robot
     )]
     NotRobot {
@@ -72,7 +72,7 @@ pub enum ReplayError {
         missing: String,
     },
     /// Neither a row nor a frame.
-    #[error("{file} holds neither a row nor a frame: give a recording of a robot")]
+    #[error("{file} contains neither rows nor frames: give a recording of a robot")]
     Empty {
         /// The file, or both.
         file: String,
@@ -110,7 +110,7 @@ impl<R: BufRead> Replay<R> {
         Ok(replay)
     }
 
-    /// Whether rows are played, so that none are to be made of the frames.
+    /// Returns whether rows are played, so that none are to be made of the frames.
     pub fn has_rows(&self) -> bool {
         self.rows.is_some()
     }
@@ -151,7 +151,7 @@ impl<R: BufRead> Replay<R> {
         Ok(item)
     }
 
-    /// How much was played so far.
+    /// Progress of the replay.
     pub fn counts(&self) -> ReplayCounts {
         let rows = self.rows.as_ref().map_or(0, RowTrack::damaged);
         let frames = self.frames.as_ref().map_or(0, FrameTrack::damaged);

@@ -13,7 +13,7 @@ pub(super) struct RowTrack<R> {
     rows: LogRows<'static, R>,
     columns: [usize; Sample::COLUMNS.len()],
     optional: [Option<usize>; OPTIONAL_COLUMNS.len()],
-    /// How far the log begins before its own zero, s.
+    /// Start of the log before its time zero, s.
     before_zero_s: f64,
     last: Duration,
     next: Option<(Duration, ReplayItem)>,
@@ -45,7 +45,7 @@ impl<R: BufRead> RowTrack<R> {
         }
     }
 
-    /// What its times count from, since 1970, where it says so.
+    /// Time zero since 1970, if given.
     pub(super) fn start(&self) -> Option<Duration> {
         self.rows.start()
     }

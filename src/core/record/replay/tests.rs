@@ -71,7 +71,7 @@ fn both_files_are_merged_by_time_and_gaps_stay() {
     let (items, counts, problems) = all(replay);
     let expected = [
         (ms(9), ReplayItem::Frame(frame(9, Direction::Sent))),
-        // In the order in which it was heard.
+        // In the order in which it was received.
         (ms(9), ReplayItem::Frame(frame(8, Direction::Received))),
         (ms(10), ReplayItem::ImuPacket(PACKET)),
         (ms(10), ReplayItem::Row(row(10))),
@@ -122,7 +122,7 @@ fn a_recording_cut_anywhere_loses_its_torn_line_only() {
     let whole = all(Replay::new(None, file("run.log", &frames), None).unwrap()).0;
     let torn = all(Replay::new(None, file("run.log", &frames[..frames.len() - 1]), None).unwrap());
     assert_eq!((torn.0.as_slice(), torn.1.damaged), (&whole[..3], 1));
-    assert_eq!(torn.2, ["run.log: line 4: the recording was cut off in this line, it was left out"]);
+    assert_eq!(torn.2, ["run.log: line 4: the recording ends in the middle of this line, which was skipped"]);
 }
 
 #[test]
@@ -164,15 +164,19 @@ fn times_of_other_loggers_and_absurd_ones_do_no_harm() {
 #[test]
 fn what_is_no_recording_is_refused_with_the_mend() {
     for (csv, log, text) in [
-        (Some("speed_rad_s,torque_nm\n1,2\n"), None, "run.csv is no robot log, it has no `time_s`: give"),
+        (
+            Some("speed_rad_s,torque_nm\n1,2\n"),
+            None,
+            "run.csv is not a robot log, because it has no `time_s`: give",
+        ),
         (
             Some("time_s,motor_angle_rad,torque_nm\n0,1,2\n"),
             None,
-            "run.csv is no robot log, it has no `x_m`, `x_dot_m_s`",
+            "run.csv is not a robot log, because it has no `x_m`, `x_dot_m_s`",
         ),
         (Some(""), None, "run.csv is empty"),
         (None, Some("hello\n"), "run.log: 1 of 1 rows cannot be used, the first at line 1"),
-        (None, Some(""), "run.log holds neither a row nor a frame: give a recording of a robot"),
+        (None, Some(""), "run.log contains neither rows nor frames: give a recording of a robot"),
     ] {
         let (csv, log) =
             (csv.and_then(|text| file("run.csv", text)), log.and_then(|text| file("run.log", text)));

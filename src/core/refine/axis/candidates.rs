@@ -2,9 +2,9 @@
 
 use std::f64::consts::TAU;
 
-use crate::effects::{EffectKind, Grid, KINDS, Machine, MachineKind, Parameter, Place, Signal};
-use crate::refine::select::Member;
-use crate::refine::whiten::Whitener;
+use crate::effects::{EffectKind, Grid, KINDS, Machine, Parameter, Place, Signal};
+use crate::model::MachineKind;
+use crate::refine::{select::Member, whiten::Whitener};
 
 use super::trace::{Acting, Rows};
 

@@ -3,12 +3,15 @@
 
 use std::f64::consts::TAU;
 
-use crate::effects::{Effect, MachineKind, Role};
+use crate::effects::Role;
 use crate::identify::motion::kinematics::direction;
+use crate::model::{Effect, MachineKind};
 use crate::record::{HealthFinding, Log, Severity};
-use crate::refine::gain::Gain;
-use crate::refine::select::{Blocks, Member};
-use crate::refine::verdict::Carried;
+use crate::refine::{
+    gain::Gain,
+    select::{Blocks, Member},
+    verdict::Transfer,
+};
 
 use super::rig::{Declared, torque_between};
 use super::trace::{Acting, Part, Rows, Trace};
@@ -108,22 +111,22 @@ pub(super) fn carried(
     rows: &Rows,
     with: &[f64],
     without: impl Fn(&[f64]) -> Option<Vec<f64>>,
-) -> Vec<Carried> {
+) -> Vec<Transfer> {
     let held_out = rows.held_out();
     let worth = |effect: &Effect| {
         let gain = Gain::new(&without(&declared.known(effect, rows))?, with, &held_out)?;
-        Some(Carried {
+        Some(Transfer {
             id: effect.id(),
             error_drop_percent: 100.0 * gain.share,
             error_drop_ci95: gain.ci95.map(|ends| ends.map(|share| 100.0 * share)),
-            zeros_rad: if effect.kind().series() { declared.zeros_rad.clone() } else { Vec::new() },
+            encoder_offsets_rad: if effect.kind().series() { declared.zeros_rad.clone() } else { Vec::new() },
         })
     };
     declared.effects.iter().filter_map(worth).collect()
 }
 
 /// Findings about other zeros of the angle, and about effects without which the logs are told better.
-pub(super) fn findings(declared: &Declared, logs: &[&Log], carried: &[Carried]) -> Vec<HealthFinding> {
+pub(super) fn findings(declared: &Declared, logs: &[&Log], carried: &[Transfer]) -> Vec<HealthFinding> {
     let column = declared.names().position;
     let finding = |column: &str, problem: String, mend: &str| {
         HealthFinding::new(Severity::Warning, column, problem, mend)

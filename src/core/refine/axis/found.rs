@@ -1,12 +1,13 @@
 //! The answer of a search: effects with their sizes and intervals, the numbers estimated along, the refined model.
 
-use crate::effects::{self, Effect, EffectError, EffectKind, MachineKind, Parameter, Role};
-use crate::identify::quantile::student_t_975;
-use crate::model_file::{Model, Rig};
-use crate::refine::Explorer;
-use crate::refine::gain::Gain;
-use crate::refine::verdict::{Corrected, Found, Unexplained};
-use crate::robot::Motor;
+use crate::effects::{self, EffectError, EffectKind, Parameter, Role};
+use crate::model::{Effect, MachineKind, Model, Motor, Rig};
+use crate::refine::{
+    Explorer,
+    gain::Gain,
+    verdict::{Corrected, Found, Unexplained},
+};
+use crate::signal::quantile::student_t_975;
 
 use super::candidates::Candidate;
 use super::floor::Floor;
@@ -221,7 +222,7 @@ pub(super) fn unexplained(
         }
         (None, None) => String::new(),
     };
-    Unexplained { depends_on, shares, description }
+    Unexplained { depends_on, fractions: shares, description }
 }
 
 /// The residual at every row.

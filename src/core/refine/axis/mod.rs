@@ -18,7 +18,7 @@ mod trace;
 mod tried;
 mod waves;
 
-use crate::model_file::Model;
+use crate::model::Model;
 use crate::record::{HealthFinding, Log};
 
 use super::error::RefineError;
@@ -130,7 +130,7 @@ pub(super) fn refine(
     let fit = search.fit(&[]).unwrap_or_else(|| before.fit.clone());
     let after = Left::new(&search, fit, &wanted);
     let end = End::new(&asked, &mut search, [before, after]);
-    Ok(Refinement { data_health, carried, ..end.refinement(model, options, &asked, &search) })
+    Ok(Refinement { data_health, transfer: carried, ..end.refinement(model, options, &asked, &search) })
 }
 
 /// The regression of a refinement, and what is to be said of its data, the worst first.
@@ -226,7 +226,7 @@ impl End {
         let over_floor = (over_floor > most).then_some(over_floor);
         let is_explained = after.structure.is_empty() && over_floor.is_none() && !wrong;
         let parameters = found::corrections(declared, nuisances, &after.fit, &search.held);
-        let told_from = asked.friction_told_from().or(declared.told_from);
+        let told_from = asked.fitted_speed_range().or(declared.told_from);
         let corrected =
             declared.corrected_model(model, options.motor, (&found::values(&parameters), told_from));
         let errors = |left: &Left| errors(declared, rows, measured, &left.residual, &floor);
@@ -245,7 +245,7 @@ impl End {
             closed_loop: None,
             next_experiment: None,
             data_health: Vec::new(),
-            carried: Vec::new(),
+            transfer: Vec::new(),
             parameters,
             explorer: found::explorer(asked, [&before.residual, &after.residual], &floor),
             document: Default::default(),

@@ -7,10 +7,9 @@
 use std::num::NonZeroUsize;
 
 use crate::friction::Stribeck;
-use crate::identify::filter::derivative;
 use crate::parallel;
-use crate::refine::largest::exceeded_by;
-use crate::refine::whiten::Whitener;
+use crate::refine::{largest::exceeded_by, whiten::Whitener};
+use crate::signal::filter::derivative;
 use crate::simulate::Noise;
 
 use super::candidates::Candidate;

@@ -48,14 +48,14 @@ impl Regression {
     }
 
     /// Speeds of the rows that free friction is told from; none where it is held.
-    pub(super) fn friction_told_from(&self) -> Option<[f64; 2]> {
+    pub(super) fn fitted_speed_range(&self) -> Option<[f64; 2]> {
         let is_told = self.nuisances.iter().any(|nuisance| nuisance.free && nuisance.is_friction());
         if is_told { self.rows.speeds(Part::Fit) } else { None }
     }
 
     /// Findings about speeds beyond those that friction was told from, by these logs or by the model.
     pub(super) fn check_speeds(&self) -> Vec<HealthFinding> {
-        let own = self.friction_told_from();
+        let own = self.fitted_speed_range();
         let beyond = |part: &Part| {
             let told_from = own.or(self.declared.told_from)?;
             health::beyond(&self.declared, told_from, self.rows.speeds(*part)?)

@@ -1,13 +1,13 @@
 //! What a model declares of one axis.
 
-use crate::effects::{Effect, Machine, MachineKind, Role};
+use crate::effects::{Machine, Role};
 use crate::friction::{Stribeck, StribeckParameters};
-use crate::identify::motion::kinematics::direction;
-use crate::identify::motion::{Axis, place};
-use crate::model_file::{AxisParameters, Model, Rig, Tolerances};
-use crate::refine::Variable;
-use crate::refine::select::{Blocks, Member};
-use crate::robot::Motor;
+use crate::identify::motion::{Axis, kinematics::direction, place};
+use crate::model::{AxisParameters, Effect, MachineKind, Model, Motor, Rig, Tolerances};
+use crate::refine::{
+    Variable,
+    select::{Blocks, Member},
+};
 
 use super::nuisance::Nuisance;
 use super::trace::{Acting, Names, Part, Rows, Trace};
@@ -63,7 +63,7 @@ impl Declared {
             tolerances: model.tolerance.clone(),
             told_from: match &model.rig {
                 Rig::Robot(_) => None,
-                Rig::Axis(axis) => axis.friction_told_from,
+                Rig::Axis(axis) => axis.fitted_speed_range,
             },
             zeros_rad: Vec::new(),
         }
@@ -252,7 +252,7 @@ impl Declared {
                         (*mass_kg, *own) = (inertia, friction);
                     }
                 }
-                axis.friction_told_from = told_from;
+                axis.fitted_speed_range = told_from;
                 // By the zero of the first log.
                 let zero_rad = self.zeros_rad.first().copied().unwrap_or(0.0);
                 axis.effects.iter_mut().for_each(|effect| *effect = effect.turned(zero_rad));

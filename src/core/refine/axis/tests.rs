@@ -6,11 +6,9 @@ use std::ops::ControlFlow;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::model_file::Model;
+use crate::model::{Model, Motor};
 use crate::record::{HealthFinding, Log, LogKind, Severity};
-use crate::refine::verdict::Channels;
-use crate::refine::{Options, Refinement, Verdict, refine, residual};
-use crate::robot::Motor;
+use crate::refine::{Options, Refinement, Verdict, refine, residual, verdict::Channels};
 use crate::shared::shared_log;
 use crate::simulate::{self, ControllerChoice, Experiment, Scenario};
 
@@ -186,7 +184,7 @@ fn logs_that_cannot_answer_are_told_before_any_effect() {
         ] {
             let found = refined(model, std::slice::from_ref(&bad), &[], &[]);
             assert_eq!((found.verdict, ids(&found)), (Verdict::DataUnfit, vec![]), "{what}");
-            let mends = found.data_health.iter().map(|finding| finding.mend.as_str());
+            let mends = found.data_health.iter().map(|finding| finding.remedy.as_str());
             assert!(mends.clone().all(|mend| !mend.contains("inf") && !mend.contains("NaN")), "{what}");
             let model = Model::from_toml(model, "model.toml").unwrap();
             let watch = &mut |_| ControlFlow::Continue(());
@@ -229,7 +227,11 @@ fn a_position_in_another_unit_is_told_and_no_effect_is() {
         );
         let is_told = |finding: &&HealthFinding| finding.column == name && finding.problem.contains(told);
         let unit = found.data_health.iter().find(is_told).unwrap();
-        assert!(unit.mend.ends_with(&format!("--map {name}={name}*{:.6}", 1.0 / factor)), "{}", unit.mend);
+        assert!(
+            unit.remedy.ends_with(&format!("--map {name}={name}*{:.6}", 1.0 / factor)),
+            "{}",
+            unit.remedy
+        );
         assert_ne!(refined(model, &[scaled(log, name, 1.0)], &[], &[]).verdict, Verdict::DataUnfit, "{told}");
     }
 }
@@ -270,7 +272,7 @@ fn held_out_logs_are_of_the_kind_of_the_others() {
             &mut |_| ControlFlow::Continue(()),
         );
         let error = found.err().unwrap();
-        assert!(error.to_string().contains("refine with them apart"), "{error}");
+        assert!(error.to_string().contains("refine with them separately"), "{error}");
     }
 }
 
@@ -292,13 +294,13 @@ fn held_out_logs_are_checked_and_have_the_rate_of_the_others() {
     let errors = |found: Refinement| -> Vec<(String, String)> {
         assert_eq!((found.verdict, found.effects.len()), (Verdict::DataUnfit, 0));
         let errors = found.data_health.into_iter().filter(|finding| finding.severity == Severity::Error);
-        errors.map(|finding| (finding.column, finding.problem + ": " + &finding.mend)).collect()
+        errors.map(|finding| (finding.column, finding.problem + ": " + &finding.remedy)).collect()
     };
     let found = errors(refined(SHAFT, std::slice::from_ref(&log), &[dead], &[]));
     assert_eq!(found[0].0, "motor_angle_rad", "{found:?}");
     for (logs, held_out) in [(vec![log.clone()], vec![half.clone()]), (vec![log, half], vec![])] {
         let [(column, told)] = errors(refined(SHAFT, &logs, &held_out, &[])).try_into().unwrap();
-        let parts = ["other.csv has 500.0 rows", "made.csv has 1000.0", "resample every log to 500.0"];
+        let parts = ["other.csv has 500.0 Hz", "made.csv has 1000.0", "resample every log to 500.0"];
         assert!(column == "time_s" && parts.iter().all(|part| told.contains(part)), "{told}");
     }
 }
@@ -398,8 +400,8 @@ fn another_zero_of_the_encoder_is_found_and_the_ripple_carries_over() {
     for zero_rad in [0.4, 2.0, 5.5] {
         let again = rippled(2, zero_rad);
         let found = refined(&text, &[first.clone(), again.clone()], &[], &[]);
-        let [ripple] = &found.carried[..] else { panic!("{:?}", found.carried) };
-        let [own, other] = ripple.zeros_rad[..] else { panic!("{ripple:?}") };
+        let [ripple] = &found.transfer[..] else { panic!("{:?}", found.transfer) };
+        let [own, other] = ripple.encoder_offsets_rad[..] else { panic!("{ripple:?}") };
         assert_eq!(own, 0.0);
         assert!(
             (other - (TAU - zero_rad)).abs() < 0.5 * TAU / (9.0 * 24.0),
@@ -440,14 +442,14 @@ fn an_effect_of_a_measured_motor_carries_over_to_a_record_at_other_speeds() {
         Options { speeds: Some([0.0, 12.0]), estimate: vec!["all".to_owned()], ..Options::default() };
     let quiet = &mut |_| ControlFlow::Continue(());
     let near = refine(&model, std::slice::from_ref(&fast), &[], &options, quiet).unwrap();
-    assert_eq!(near.carried[0].id, "cogging");
-    assert!(near.carried[0].error_drop_percent > 55.0, "{:?}", near.carried);
+    assert_eq!(near.transfer[0].id, "cogging");
+    assert!(near.transfer[0].error_drop_percent > 55.0, "{:?}", near.transfer);
     let warned = |found: &[crate::record::HealthFinding], words: &str| {
         found.iter().any(|finding| finding.severity == Severity::Warning && finding.problem.contains(words))
     };
     assert!(warned(&near.data_health, "counts from elsewhere"), "{:#?}", near.data_health);
     let all = refined(&text, std::slice::from_ref(&fast), std::slice::from_ref(&rolling), &["all"]);
-    assert!(all.carried[0].error_drop_percent > -2.0, "{:?}", all.carried);
+    assert!(all.transfer[0].error_drop_percent > -2.0, "{:?}", all.transfer);
     for log in [fast, rolling] {
         let told = residual(&model, &[log], &Options::default(), quiet).unwrap();
         assert!(warned(&told.data_health, "friction of the model was told from"), "{:#?}", told.data_health);

@@ -2,12 +2,15 @@
 
 use std::f64::consts::{PI, TAU};
 
-use crate::effects::{EffectKind, Law, MachineKind, Moment, Place};
-use crate::identify::filter::{ZeroPhase, derivative};
+use crate::effects::{EffectKind, Law, MotionSample as Moment, Place};
 use crate::identify::motion::kinematics::{Stretch, near_rest, stretches, white_noise};
+use crate::model::MachineKind;
 use crate::record::Log;
-use crate::refine::select::{Blocks, Member};
-use crate::refine::split::split_s;
+use crate::refine::{
+    select::{Blocks, Member},
+    split::split_s,
+};
+use crate::signal::filter::{ZeroPhase, derivative};
 
 /// Highest cut-off of the kernel, Hz.
 const HIGHEST_CUTOFF_HZ: f64 = 100.0;

@@ -1,36 +1,36 @@
 //! What was tried, best first, and what became of it.
 
-use crate::effects::MachineKind;
-use crate::refine::verdict::{Fate, Found, Tried};
+use crate::model::MachineKind;
+use crate::refine::verdict::{Found, Outcome, ScoredCandidate};
 
 use super::search::{Alone, Thresholds};
 
-/// Everything that was tried alone, with its fate in the end.
+/// Everything that was tried alone, with its outcome in the end.
 pub(super) fn tried(
     alone: &[Alone],
     effects: &[Found],
     passing: Thresholds,
     machine: MachineKind,
-) -> Vec<Tried> {
-    let fate = |alone: &Alone| {
+) -> Vec<ScoredCandidate> {
+    let outcome = |alone: &Alone| {
         if effects.iter().any(|found| found.effect.kind() == alone.kind) {
-            return Fate::Added;
+            return Outcome::Added;
         }
         let twin = effects.iter().find(|found| found.ambiguous_with.contains(&alone.kind));
         match twin {
-            Some(twin) => Fate::NotToldFrom(twin.effect.kind()),
-            None if alone.gain <= passing.gain && !alone.testable => Fate::NotTestable,
-            None if alone.gain <= passing.gain => Fate::TooSmall,
-            None if alone.z >= passing.z && !effects.is_empty() => Fate::Explained,
-            None => Fate::NotSure,
+            Some(twin) => Outcome::Ambiguous(twin.effect.kind()),
+            None if alone.gain <= passing.gain && !alone.testable => Outcome::NotTestable,
+            None if alone.gain <= passing.gain => Outcome::TooSmall,
+            None if alone.z >= passing.z && !effects.is_empty() => Outcome::Explained,
+            None => Outcome::NotSignificant,
         }
     };
-    let told = |alone: &Alone| Tried {
+    let told = |alone: &Alone| ScoredCandidate {
         kind: alone.kind,
-        detail: Tried::detail_of(alone.kind, &alone.shape, machine),
+        detail: ScoredCandidate::detail_of(alone.kind, &alone.shape, machine),
         gain_percent: 100.0 * alone.gain,
         z: alone.z,
-        fate: fate(alone),
+        outcome: outcome(alone),
     };
     alone.iter().map(told).collect()
 }

@@ -1,6 +1,6 @@
 //! Which harmonics of the position a residual has.
 
-use crate::effects::{EffectKind, KINDS, Machine, Moment};
+use crate::effects::{EffectKind, KINDS, Machine, MotionSample as Moment};
 use crate::refine::whiten::Whitener;
 
 use super::candidates::{Candidate, Scales, shape_of_wave, wave_numbers};
@@ -35,7 +35,7 @@ pub(super) fn strongest(
                 torque_nm: effort[row],
                 ..Moment::default()
             };
-            chosen.iter().map(|&row| kind.wave_nm(&moment(row))).collect()
+            chosen.iter().map(|&row| kind.harmonic_nm(&moment(row))).collect()
         })
         .collect();
     let gains = GainTable::new(rows, whitener);

@@ -1,4 +1,4 @@
-//! What to record next: of the runs that a machine can do, the one in which effects that look alike would be farthest
+//! Next experiment: of the runs that a machine can do, the one in which effects that look alike would be farthest
 //! apart.
 //!
 //! # Method
@@ -15,9 +15,8 @@ mod separation;
 use serde::Serialize;
 
 use super::verdict::{Found, Refinement, Unexplained};
-use crate::model_file::{AxisParameters, Rig};
+use crate::model::{AxisParameters, Motor, Rig};
 use crate::record::Log;
-use crate::robot::Motor;
 use crate::simulate::Scenario;
 
 use runs::runs;
@@ -30,12 +29,12 @@ pub struct NextExperiment {
     pub summary: String,
     /// Ids of the effects that it tells from each other.
     pub separates: Vec<&'static str>,
-    /// Scenario of the simulated robot; none where it is none.
+    /// Scenario of the simulated robot; `None` if it is none.
     pub scenario: Option<String>,
-    /// How far the residuals of those effects would be apart, in standard deviations of the noise; 0 where it was not
+    /// Distance between the residuals of those effects in standard deviations of the noise; 0 where it was not
     /// worked out.
     pub separation: f64,
-    /// A command that runs exactly it; none where no command can.
+    /// A command that runs exactly it; `None` if no command can.
     pub command: Option<String>,
 }
 
@@ -49,8 +48,8 @@ impl NextExperiment {
 /// Standard deviations apart from which on a run is worth its while.
 const WORTH: f64 = 5.0;
 
-/// What is known of a question.
-pub(super) struct Asked<'a> {
+/// Information on a question.
+pub(super) struct Context<'a> {
     pub(super) logs: &'a [Log],
     pub(super) motor: Motor,
     pub(super) seed: u64,
@@ -58,19 +57,19 @@ pub(super) struct Asked<'a> {
     pub(super) file: &'a str,
 }
 
-/// The run that would tell most beyond what the logs have told; none where nothing is open.
-pub(super) fn next_experiment(found: &Refinement, asked: &Asked<'_>) -> Option<NextExperiment> {
+/// The run that would tell most beyond what the logs have told; `None` if nothing is open.
+pub(super) fn next_experiment(found: &Refinement, context: &Context<'_>) -> Option<NextExperiment> {
     let open = found.effects.iter().find(|effect| !effect.ambiguous_with.is_empty());
-    let Some(effect) = open else { return of_rest(found, asked) };
+    let Some(effect) = open else { return of_rest(found, context) };
     let words = told_apart(effect);
     let runs = runs(&found.model);
-    let separations = separations(found, effect, &runs, asked).unwrap_or_default();
+    let separations = separations(found, effect, &runs, context).unwrap_or_default();
     let best = (0..separations.len()).max_by(|&a, &b| separations[a].total_cmp(&separations[b]));
     match best {
         Some(best) if separations[best] > WORTH => {
             let run = &runs[best];
             let summary = format!(
-                "{}: {}, where they would be {:.0} standard deviations of the noise apart, the most of {} runs",
+                "{}: {}, where they would differ by {:.0} standard deviations of the noise, the most of {} runs",
                 words.0,
                 run.words,
                 separations[best],
@@ -81,7 +80,7 @@ pub(super) fn next_experiment(found: &Refinement, asked: &Asked<'_>) -> Option<N
                 separates: words.1,
                 scenario: Some(run.experiment.scenario.name().to_owned()),
                 separation: separations[best],
-                command: Some(run.command(&found.model, asked)),
+                command: Some(run.command(&found.model, context)),
             })
         }
         _ => {
@@ -93,12 +92,12 @@ pub(super) fn next_experiment(found: &Refinement, asked: &Asked<'_>) -> Option<N
 
 fn told_apart(effect: &Found) -> (String, Vec<&'static str>) {
     let others: Vec<&'static str> = effect.ambiguous_with.iter().map(|kind| kind.id).collect();
-    let words = format!("to tell {} from {}", effect.effect.id(), others.join(", "));
+    let words = format!("to distinguish {} from {}", effect.effect.id(), others.join(", "));
     (words, std::iter::once(effect.effect.id()).chain(others).collect())
 }
 
-/// What would tell more of what is left.
-fn of_rest(found: &Refinement, asked: &Asked<'_>) -> Option<NextExperiment> {
+/// Experiment that would explain more of the remaining error.
+fn of_rest(found: &Refinement, context: &Context<'_>) -> Option<NextExperiment> {
     let left: &Unexplained = &found.unexplained;
     if left.description.is_empty() {
         return None;
@@ -109,7 +108,7 @@ fn of_rest(found: &Refinement, asked: &Asked<'_>) -> Option<NextExperiment> {
         if matches!(axis.parameters, AxisParameters::Rotary { gravity_torque_nm, .. } if gravity_torque_nm != 0.0));
     let (words, run) = match left.depends_on.first().map(String::as_str) {
         Some("time_s") | None => {
-            let words = "the same run again, to see whether it comes back at the same time".to_owned();
+            let words = "repeat the same run, to see whether it recurs at the same time".to_owned();
             return Some(NextExperiment::in_words(words));
         }
         Some(name) if name.contains("speed") => (name, on(Scenario::FrictionSweep)),
@@ -119,18 +118,20 @@ fn of_rest(found: &Refinement, asked: &Asked<'_>) -> Option<NextExperiment> {
     };
     if swings {
         let summary = format!(
-            "a run in which {words} varies more: the load lifted slowly and let down slowly over its whole range, then \
-             swung at several speeds"
+            "a run in which {words} varies more: raise and lower the load slowly over its whole range, then \
+             swing it at several speeds"
         );
         return Some(NextExperiment::in_words(summary));
     }
     let summary = match run {
         Some(run) => format!("a run in which {words} varies more: {}", run.words),
-        None => format!("a run in which {words} varies while all else is kept as even as can be"),
+        None => {
+            format!("a run in which {words} varies while everything else is kept as constant as possible")
+        }
     };
     Some(NextExperiment {
         scenario: run.map(|run| run.experiment.scenario.name().to_owned()),
-        command: run.map(|run| run.command(&found.model, asked)),
+        command: run.map(|run| run.command(&found.model, context)),
         ..NextExperiment::in_words(summary)
     })
 }

@@ -1,17 +1,19 @@
-//! What effects add to the residual of a run, in units of its noise.
+//! Contribution of effects to the residual of a run, in units of its noise.
 
 use super::normal::Normal;
-use crate::effects::{self, Action, EffectKind, Law, Machine, MachineKind, Moment, Parameter, Role};
-use crate::model_file::{AxisParameters, Model, Rig};
+use crate::effects::{self, Action, EffectKind, Law, Machine, MotionSample, Parameter, Role};
+use crate::model::{AxisParameters, MachineKind, Model, Motor, Rig};
 use crate::record::Log;
-use crate::refine::prediction::moments;
-use crate::refine::robot;
-use crate::refine::verdict::{Found, Refinement};
-use crate::robot::Motor;
+use crate::refine::{
+    prediction::moments,
+    robot,
+    verdict::{Found, Refinement},
+};
 
 /// Rows over which residuals are averaged, s.
 const ROW_S: f64 = 0.01;
-/// Declared numbers that are free within their tolerances, as effects, and their keys on a robot, a shaft and a carriage.
+/// Declared numbers that are free within their tolerances, as effects, and their keys on a robot, a shaft and a
+/// carriage.
 const FREE: [(&str, [&str; 3]); 6] = [
     ("coulomb_error", ["coulomb_nm", "coulomb_nm", "coulomb_n"]),
     ("viscous_error", ["viscous_nm_s_rad", "viscous_nm_s_rad", "viscous_n_s_m"]),
@@ -23,7 +25,7 @@ const FREE: [(&str, [&str; 3]); 6] = [
 
 /// Moments of a run of the robot on its wheels, or of one shaft.
 pub(super) struct Seen {
-    moments: Vec<Vec<Moment>>,
+    moments: Vec<Vec<MotionSample>>,
     on_ground: bool,
 }
 
@@ -134,7 +136,7 @@ impl<'a> View<'a> {
         self.ground.as_ref().filter(|_| seen.on_ground).unwrap_or(&self.shaft)
     }
 
-    /// What the effect does in each of the runs.
+    /// Contribution of the effect in each of the runs.
     pub(super) fn law(&self, effect: &Found, seen: &[Seen]) -> Vec<Residuals> {
         let act = |seen: &Seen| self.act(effect.effect.kind(), &effect.effect.law(self.machine(seen)), seen);
         seen.iter().map(act).collect()

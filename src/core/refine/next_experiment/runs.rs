@@ -1,13 +1,12 @@
 //! The runs that a machine can do, each with the command that starts it.
 
-use super::Asked;
-use crate::model_file::{AxisParameters, Model, Rig};
-use crate::robot::{Motor, Payload};
+use super::Context;
+use crate::model::{AxisParameters, Model, Motor, Payload, Rig};
 use crate::simulate::{ControllerChoice, Experiment, Scenario};
 
 /// Length of a run, s.
 const SECONDS: f64 = 30.0;
-/// Load that is put on a body, as a share of it.
+/// Load that is put on a body, as a fraction of it.
 const LOAD: f64 = 0.15;
 
 /// A run that a machine can do.
@@ -18,9 +17,9 @@ pub(super) struct Run {
 }
 
 impl Run {
-    pub(super) fn command(&self, model: &Model, asked: &Asked<'_>) -> String {
+    pub(super) fn command(&self, model: &Model, context: &Context<'_>) -> String {
         let Experiment { scenario, controller, seconds, .. } = &self.experiment;
-        let file = match asked.file {
+        let file = match context.file {
             "" => "MODEL".to_owned(),
             plain if plain.chars().all(|c| c.is_ascii_alphanumeric() || "/._-+=".contains(c)) => {
                 plain.to_owned()
@@ -29,11 +28,12 @@ impl Run {
         };
         let controller = controller.name();
         // On the ground a log holds both motors.
-        let of_right = asked.motor == Motor::Right && model.robot().is_some() && !self.experiment.on_ground();
+        let of_right =
+            context.motor == Motor::Right && model.robot().is_some() && !self.experiment.on_ground();
         let motor = if of_right { " --motor right" } else { "" };
         format!(
             "flqr simulate {file} --scenario {scenario} --controller {controller} --seconds {seconds}{} --seed {}{motor} --log next.csv",
-            self.flags, asked.seed
+            self.flags, context.seed
         )
     }
 }
@@ -52,11 +52,11 @@ pub(super) fn runs(model: &Model) -> Vec<Run> {
         Run { experiment: Experiment { target_speed_rad_s, ..plain.experiment.clone() }, flags, ..plain }
     };
     let mut found = vec![
-        air("the wheels in the air at 33 constant speeds, both ways", Scenario::FrictionSweep),
-        air("the wheels in the air under torques of many frequencies", Scenario::Multisine),
-        turning("a wheel in the air, slowly forward", 1.0),
-        turning("a wheel in the air, slowly backward", -1.0),
-        turning("a wheel in the air, fast", 20.0),
+        air("wheels in the air at 33 constant speeds in both directions", Scenario::FrictionSweep),
+        air("wheels in the air with multisine torques", Scenario::Multisine),
+        turning("one wheel in the air, slowly forward", 1.0),
+        turning("one wheel in the air, slowly backward", -1.0),
+        turning("one wheel in the air, fast", 20.0),
     ];
     match &model.rig {
         Rig::Axis(axis) => {
@@ -67,14 +67,14 @@ pub(super) fn runs(model: &Model) -> Vec<Run> {
                     found.retain(|run| run.experiment.scenario == Scenario::Multisine);
                     found
                         .iter_mut()
-                        .for_each(|run| run.words = "torques of many frequencies about where it hangs");
+                        .for_each(|run| run.words = "multisine torques around the hanging equilibrium");
                     return found;
                 }
                 AxisParameters::Rotary { .. } => {}
             }
             for (run, words) in found.iter_mut().zip([
-                "33 constant speeds, both ways",
-                "torques of many frequencies",
+                "33 constant speeds in both directions",
+                "multisine torques",
                 "slowly forward",
                 "slowly backward",
                 "fast forward",
@@ -110,11 +110,11 @@ pub(super) fn runs(model: &Model) -> Vec<Run> {
                 ground("driving out and back", Scenario::Cruise),
                 sloped("driving out and back up a slope", 0.05),
                 sloped("driving out and back down a slope", -0.05),
-                loaded("driving out and back with a load", Scenario::Cruise),
-                ground("torques of many frequencies while it balances", Scenario::Multisine),
-                scaled("twice the torques of many frequencies while it balances", 2.0),
-                scaled("four times the torques of many frequencies while it balances", 4.0),
-                loaded("torques of many frequencies while it balances, with a load", Scenario::Multisine),
+                loaded("driving out and back with a payload", Scenario::Cruise),
+                ground("multisine torques while balancing", Scenario::Multisine),
+                scaled("multisine torques twice as large while balancing", 2.0),
+                scaled("multisine torques four times larger while balancing", 4.0),
+                loaded("multisine torques while balancing, with a payload", Scenario::Multisine),
             ]);
         }
         Rig::Robot(_) => {}

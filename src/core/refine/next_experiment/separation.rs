@@ -1,9 +1,9 @@
-//! How far apart an effect and its rivals would be in a run, beside what a log has told already.
+//! Separation of an effect from its rivals in a run, given an earlier log.
 
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
 
-use super::Asked;
+use super::Context;
 use super::normal::Normal;
 use super::residuals::{Seen, Shaped, View};
 use super::runs::Run;
@@ -11,15 +11,15 @@ use crate::parallel;
 use crate::refine::verdict::{Found, Refinement};
 use crate::simulate::{self, Experiment};
 
-/// How far apart the effect and its nearest rival would be in each of the runs; none where the log has no motion.
+/// Separation of the effect from its nearest rival in each of the runs; `None` if the log has no motion.
 pub(super) fn separations(
     found: &Refinement,
     effect: &Found,
     runs: &[Run],
-    asked: &Asked<'_>,
+    context: &Context<'_>,
 ) -> Option<Vec<f64>> {
-    let view = View::new(found, asked.motor)?;
-    let recorded: Vec<Seen> = asked.logs.iter().filter_map(|log| view.seen(log)).collect();
+    let view = View::new(found, context.motor)?;
+    let recorded: Vec<Seen> = context.logs.iter().filter_map(|log| view.seen(log)).collect();
     if recorded.is_empty() {
         return None;
     }
@@ -45,11 +45,11 @@ pub(super) fn separations(
     }
     let threads = NonZeroUsize::new(2).expect("2 is not 0");
     Some(parallel::map(runs, threads, |run| {
-        let experiment = Experiment { seed: asked.seed, ..run.experiment.clone() };
+        let experiment = Experiment { seed: context.seed, ..run.experiment.clone() };
         let watch = &mut |_| ControlFlow::Continue(());
         let Ok(outcome) = simulate::run(&experiment, &found.model, &found.model, watch) else { return 0.0 };
         let fell = matches!(&outcome, simulate::Outcome::Ground(run) if run.statistics.fell);
-        let Some(seen) = view.seen(&outcome.log(asked.motor)).filter(|_| !fell) else { return 0.0 };
+        let Some(seen) = view.seen(&outcome.log(context.motor)).filter(|_| !fell) else { return 0.0 };
         let seen = [seen];
         let told = view.rows(&view.law(effect, &seen));
         let apart = |(shape, normal, left): &(Shaped, Normal, f64)| {

@@ -1,8 +1,9 @@
 use std::ops::ControlFlow;
 
 use super::*;
-use crate::effects::{self, Effect, MachineKind};
-use crate::model_file::{Model, presets};
+use crate::effects::{self};
+use crate::model::{Effect, MachineKind, Model};
+use crate::model_file::presets;
 use crate::refine::verdict::{Channels, Errors, Quantity, Verdict};
 use crate::simulate::{self, ControllerChoice, Experiment};
 
@@ -34,7 +35,7 @@ fn found(id: &str, parameters: &[(&str, f64)], rival: &str) -> Refinement {
         closed_loop: None,
         next_experiment: None,
         data_health: Vec::new(),
-        carried: Vec::new(),
+        transfer: Vec::new(),
         parameters: Vec::new(),
         model,
         explorer: Default::default(),
@@ -42,19 +43,19 @@ fn found(id: &str, parameters: &[(&str, f64)], rival: &str) -> Refinement {
     }
 }
 
-fn asked(found: &Refinement, scenario: Scenario) -> NextExperiment {
+fn context(found: &Refinement, scenario: Scenario) -> NextExperiment {
     let experiment = Experiment { seconds: 12.0, ..Experiment::new(scenario, ControllerChoice::Flqr) };
     let watch = &mut |_| ControlFlow::Continue(());
     let log = simulate::run(&experiment, &presets::paper(), &found.model, watch).unwrap().log(Motor::Left);
-    let asked = Asked { logs: &[log], motor: Motor::Left, seed: 1, file: "my robot.toml" };
-    next_experiment(found, &asked).unwrap()
+    let context = Context { logs: &[log], motor: Motor::Left, seed: 1, file: "my robot.toml" };
+    next_experiment(found, &context).unwrap()
 }
 
 /// A slope pulls at the ground alone: with the wheels in the air an asymmetry of the friction stays.
 #[test]
 fn slope_and_asymmetry_are_told_apart_by_a_run_that_can_be_started() {
     let found = found("ground_slope", &[("slope_rad", 0.01)], "friction_asymmetry");
-    let next = asked(&found, Scenario::Cruise);
+    let next = context(&found, Scenario::Cruise);
     assert_eq!(next.separates, ["ground_slope", "friction_asymmetry"]);
     assert!(next.separation > WORTH, "{next:?}");
     let command = next.command.unwrap();
@@ -81,8 +82,8 @@ fn a_load_that_swings_is_not_asked_to_turn_at_a_constant_speed() {
 #[test]
 fn a_command_names_the_motor_of_the_right_wheel_and_a_word_for_a_file_without_a_name() {
     let model = presets::paper();
-    let asked = Asked { logs: &[], motor: Motor::Right, seed: 7, file: "" };
-    let commands: Vec<String> = runs(&model).iter().map(|run| run.command(&model, &asked)).collect();
+    let context = Context { logs: &[], motor: Motor::Right, seed: 7, file: "" };
+    let commands: Vec<String> = runs(&model).iter().map(|run| run.command(&model, &context)).collect();
     let sweep =
         "flqr simulate MODEL --scenario friction-sweep --controller pi --seconds 120 --seed 7 --motor right";
     assert_eq!(commands[0], format!("{sweep} --log next.csv"));
@@ -94,6 +95,6 @@ fn a_command_names_the_motor_of_the_right_wheel_and_a_word_for_a_file_without_a_
 #[test]
 fn what_no_run_tells_apart_is_told_in_words() {
     let found = found("command_delay", &[("delay_s", 0.004)], "imu_delay");
-    let next = asked(&found, Scenario::Station);
+    let next = context(&found, Scenario::Station);
     assert!(next.command.is_none() && next.summary.contains("30 Hz"), "{next:?}");
 }

@@ -12,10 +12,9 @@ mod start;
 use std::num::NonZeroUsize;
 
 use super::verdict::{Prediction, Quantity};
-use crate::model_file::{AxisParameters, Model, Rig};
+use crate::model::{AxisParameters, Model, Motor, Rig};
 use crate::parallel;
 use crate::record::Log;
-use crate::robot::Motor;
 
 use moving::Moving;
 pub(super) use record::moments;
@@ -85,8 +84,8 @@ fn summed(names: &[(&'static str, &'static str)], runs: &[Ends]) -> Vec<Predicti
                 Quantity::new((sum / ends.len() as f64).sqrt(), unit)
             };
             let [rmse, motion, noise_floor] = [0, 1, 2].map(rms);
-            let told = noise_floor.value < motion.value;
-            found.push(Prediction { variable, horizon_s, rmse, motion, noise_floor, told });
+            let informative = noise_floor.value < motion.value;
+            found.push(Prediction { variable, horizon_s, rmse, motion, noise_floor, informative });
         }
     }
     found

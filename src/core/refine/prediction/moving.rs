@@ -1,10 +1,9 @@
 //! The machine of a model: shown a log, so that what has a memory remembers, and let go at a row.
 
 use super::record::{Record, Told};
-use crate::effects::{EffectLaw, Law, Machine, Moment, RobotLaws};
+use crate::effects::{EffectLaw, Law, Machine, MotionSample, RobotLaws};
 use crate::friction::Stribeck;
-use crate::model_file::{AxisParameters, Model, Rig, RobotModel};
-use crate::robot::{Motor, State};
+use crate::model::{AxisParameters, Model, Motor, Rig, RobotModel, State};
 use crate::simulate::{Actuator, Followed, Plant};
 
 /// A machine that can be shown a log and be let go.
@@ -72,14 +71,14 @@ impl Moving {
             }
             Self::Axis { laws, before, .. } => {
                 let speed = speed(&record.angles[0]);
-                let moment = Moment {
+                let moment = MotionSample {
                     time_s: record.time_s[row],
                     dt_s: dt,
                     motor_angle_rad: record.angles[0][row],
                     motor_speed_rad_s: speed,
                     motor_accel_rad_s2: (speed - *before) / dt,
                     torque_nm: record.efforts[0][row],
-                    ..Moment::default()
+                    ..MotionSample::default()
                 };
                 *before = speed;
                 laws.iter_mut().for_each(|law| {

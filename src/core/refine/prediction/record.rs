@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::{HORIZONS_S, Rows};
-use crate::effects::Moment;
+use crate::effects::MotionSample;
 use crate::record::Log;
 use crate::refine::robot::{at_even_times, fresh_rows};
 use crate::refine::split::split_s;
@@ -25,7 +25,7 @@ pub(super) struct Record {
     broken: Vec<usize>,
 }
 
-/// What a log says of the machine at a row.
+/// Machine state at a row of a log.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Told {
     pub(super) angle: [f64; 2],
@@ -95,7 +95,7 @@ impl Record {
         Some(record)
     }
 
-    /// Whether every cell of a row has a number.
+    /// Returns whether every cell of a row has a number.
     pub(super) fn is_whole(&self, row: usize) -> bool {
         let of_imu =
             self.imu.as_ref().is_none_or(|(pitch, rate, _)| pitch[row].is_finite() && rate[row].is_finite());
@@ -228,7 +228,7 @@ impl Record {
 }
 
 /// Every row of a bench log as a law sees it.
-pub(in crate::refine) fn moments(log: &Log) -> Option<Vec<Moment>> {
+pub(in crate::refine) fn moments(log: &Log) -> Option<Vec<MotionSample>> {
     let record = Record::new(log, false)?;
     let rows = record.time_s.len();
     let half = record.angle_half();
@@ -241,7 +241,7 @@ pub(in crate::refine) fn moments(log: &Log) -> Option<Vec<Moment>> {
         let (before, after) = (row.saturating_sub(half), (row + half).min(rows - 1));
         (speeds[after] - speeds[before]) / ((after - before) as f64 * record.dt_s)
     };
-    let moment = |row: usize| Moment {
+    let moment = |row: usize| MotionSample {
         time_s: record.time_s[row],
         dt_s: record.dt_s,
         motor_angle_rad: record.angles[0][row],
@@ -249,7 +249,7 @@ pub(in crate::refine) fn moments(log: &Log) -> Option<Vec<Moment>> {
         motor_accel_rad_s2: accel(row),
         torque_nm: record.efforts[0][row],
         torque_sum_nm: record.efforts[0][row],
-        ..Moment::default()
+        ..MotionSample::default()
     };
     Some((0..rows).map(moment).collect())
 }

@@ -2,7 +2,8 @@
 
 use std::num::NonZeroUsize;
 
-use crate::effects::{EffectKind, Form, Grid, KINDS, MachineKind, Parameter, Step};
+use crate::effects::{EffectKind, Form, Grid, KINDS, Parameter, Step};
+use crate::model::MachineKind;
 use crate::parallel;
 
 use super::trace::{Pair, Trace};
@@ -170,7 +171,7 @@ impl Reach {
     fn new(trace: &Trace) -> Self {
         let speeds: Vec<f64> = trace.moments().map(|m| m.motor_speed_rad_s.abs()).collect();
         let typical = quantile(&speeds, 0.5).max(0.3);
-        let way = |[low, high]: [f64; 2], m: &crate::effects::Moment| [low.min(m.x_m), high.max(m.x_m)];
+        let way = |[low, high]: [f64; 2], m: &crate::effects::MotionSample| [low.min(m.x_m), high.max(m.x_m)];
         Self {
             most_order: ((std::f64::consts::TAU * BAND_HZ / typical) as u32).clamp(8, 60),
             peak_nm: trace.moments().fold(0.0, |peak, m| f64::max(peak, m.torque_nm.abs())),
@@ -207,7 +208,7 @@ impl Reach {
             Grid::OfTorque(shares) => of(shares, self.peak_nm),
             Grid::OfHeight(shares) => of(shares, self.height_m),
             Grid::OfWheelInertia(share) => vec![share * self.wheel_inertia_kg_m2],
-            Grid::Way => {
+            Grid::Distance => {
                 let ([low, high], Some(apart)) = (self.way_m, next.first()) else { return Vec::new() };
                 let count = ((high - low) / apart).clamp(1.0, MOST_PLACES) as usize;
                 (0..count).map(|i| low + (high - low) * (i as f64 + 0.5) / count as f64).collect()

@@ -1,9 +1,9 @@
 //! From picks to effects with sizes, intervals and what they cannot be told from.
 
-use crate::effects::{Effect, EffectKind, Form, KINDS, MachineKind, Role, Term};
-use crate::identify::quantile::student_t_975;
-use crate::model_file::{Model, Rig};
+use crate::effects::{EffectKind, Form, KINDS, Role, Term};
+use crate::model::{Effect, MachineKind, Model, Rig};
 use crate::refine::verdict::{Corrected, Found};
+use crate::signal::quantile::student_t_975;
 
 use super::candidates::Candidate;
 use super::motion::Readings;

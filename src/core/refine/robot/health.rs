@@ -1,9 +1,8 @@
 //! What makes a robot's log unfit, said before any effect is named.
 
 use crate::effects::Machine;
-use crate::model_file::RobotModel;
-use crate::record::runs::longest_run;
-use crate::record::{self, HealthFinding, Log, Severity};
+use crate::model::RobotModel;
+use crate::record::{self, HealthFinding, Log, Severity, runs::longest_run};
 use crate::refine::{is_unfit, rates};
 
 use super::candidates::quantile;

@@ -2,10 +2,10 @@
 
 use std::ops::ControlFlow;
 
+use crate::model::Motor;
 use crate::model_file::presets;
 use crate::record::{Log, Severity};
 use crate::refine::{Options, Refinement, Verdict, refine};
-use crate::robot::Motor;
 use crate::simulate::{self, ControllerChoice, Experiment, Scenario};
 
 fn driven(scenario: Scenario) -> Log {

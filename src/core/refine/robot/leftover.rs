@@ -1,6 +1,6 @@
 //! What no effect explains: whether there is any, and what it depends on.
 
-use crate::effects::Moment;
+use crate::effects::MotionSample as Moment;
 use crate::refine::verdict::{Test, Unexplained};
 
 use super::channels::Channels;
@@ -39,7 +39,7 @@ pub(super) fn only_held_out(search: &Search<'_>, fit: &Fit) -> Option<Unexplaine
          depends most on {first}"
     );
     let (depends_on, shares) = shares.into_iter().unzip();
-    Some(Unexplained { depends_on, shares, description })
+    Some(Unexplained { depends_on, fractions: shares, description })
 }
 
 /// What is left beyond the noise; none where there is nothing.
@@ -81,7 +81,10 @@ pub(super) fn structure(search: &Search<'_>, fit: &Fit) -> Option<Structure> {
     let more = 100.0 * (whole - 1.0).max(0.0);
     let description = format!("{more:.0} % more than noise is left{place}; it depends most on {first}");
     let (depends_on, shares) = shares.into_iter().unzip();
-    Some(Structure { told: Unexplained { depends_on, shares, description }, is_wave: order.is_some() })
+    Some(Structure {
+        told: Unexplained { depends_on, fractions: shares, description },
+        is_wave: order.is_some(),
+    })
 }
 
 /// Largest mean square over a short time, and when that is.

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::effects::{Action, Moment};
+use crate::effects::{Action, MotionSample as Moment};
 
 use super::kernel::dot;
 use super::search::Search;

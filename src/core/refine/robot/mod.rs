@@ -29,10 +29,10 @@ mod waves;
 
 use std::num::NonZeroUsize;
 
-use crate::effects::{Form, Moment};
-use crate::identify::quantile::student_t_975;
-use crate::model_file::{Model, RobotModel};
+use crate::effects::{Form, MotionSample as Moment};
+use crate::model::{Model, RobotModel};
 use crate::record::{HealthFinding, Log, LogKind};
+use crate::signal::quantile::student_t_975;
 
 use super::error::RefineError;
 use super::verdict::{
@@ -312,7 +312,7 @@ fn answer(
         closed_loop: None,
         next_experiment: None,
         data_health,
-        carried: Vec::new(),
+        transfer: Vec::new(),
         parameters,
         model: refined,
         explorer,

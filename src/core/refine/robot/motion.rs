@@ -1,11 +1,10 @@
 //! What a robot's log says of its motion, row by row: the IMU's held readings are filled with the motion that the
 //! model makes of the torques in between.
 
-use crate::effects::{Action, Moment};
+use crate::effects::{Action, MotionSample as Moment};
 use crate::friction::Stribeck;
-use crate::model_file::RobotModel;
+use crate::model::{Accelerations, Coefficients, RobotModel};
 use crate::record::Log;
-use crate::robot::{Accelerations, Coefficients};
 
 use super::kernel::Kernel;
 

@@ -1,8 +1,8 @@
 //! Declared numbers, free within their tolerances.
 
-use crate::effects::{Action, Form, KINDS, Moment};
+use crate::effects::{Action, Form, KINDS, MotionSample as Moment};
 use crate::friction::StribeckParameters;
-use crate::model_file::Tolerances;
+use crate::model::Tolerances;
 use crate::refine::select::Member;
 
 use super::trace::{Pair, Trace};

@@ -3,11 +3,10 @@
 use std::ops::ControlFlow;
 
 use super::*;
-use crate::effects::{Effect, MachineKind};
 use crate::friction::{Stribeck, StribeckParameters};
-use crate::model_file::{Rig, presets};
+use crate::model::{Effect, MachineKind, Motor, Rig};
+use crate::model_file::presets;
 use crate::record::Severity;
-use crate::robot::Motor;
 use crate::simulate::{self, ControllerChoice, Experiment, Scenario};
 
 fn go_on(_: f64) -> ControlFlow<()> {
@@ -38,7 +37,7 @@ fn held_out_logs_are_checked_and_have_the_rate_of_the_others() {
     let half = changed(&log, |_, values| values.iter().copied().step_by(2).collect());
     for (held_out, column, told) in [
         (in_degrees, "pitch_rate_rad_s", "its unit is wrong"),
-        (half, "time_s", "one filter serves all logs"),
+        (half, "time_s", "one filter is used for all logs"),
     ] {
         let logs = std::slice::from_ref(&log);
         let found = refine(&model, logs, &[held_out], &Options::default(), &mut go_on).unwrap();

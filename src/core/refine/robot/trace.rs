@@ -3,10 +3,9 @@
 use std::f64::consts::TAU;
 use std::sync::OnceLock;
 
-use crate::effects::{Action, Effect, EffectKind, Form, Law, Machine, Moment, Place, Term};
-use crate::model_file::RobotModel;
+use crate::effects::{Action, EffectKind, Form, Law, Machine, MotionSample as Moment, Place, Term};
+use crate::model::{Effect, Motor, RobotModel};
 use crate::refine::split::split_s;
-use crate::robot::Motor;
 
 use super::kernel::Kernel;
 use super::motion::{Loads, Motion, Readings, late_residual, of_action};

@@ -8,10 +8,9 @@
 
 use nalgebra::{Matrix2, Matrix4};
 
-use crate::effects::{Declared, Effect, EffectKind, Law, MachineKind, Moment, Place, Term};
-use crate::lqr::{self, Weights};
-use crate::model_file::RobotModel;
-use crate::robot::{RobotParameters, State};
+use crate::effects::{Declared, EffectKind, Law, MotionSample as Moment, Place, Term};
+use crate::lqr::{self};
+use crate::model::{Effect, MachineKind, RobotModel, RobotParameters, State, Weights};
 use crate::simulate::{Forcing, Noise, PlanarPlant};
 
 use super::channels::Channels;

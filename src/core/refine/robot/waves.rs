@@ -1,6 +1,6 @@
 //! Harmonics of the motors' angle: orders next to each other in one pass over the rows.
 
-use crate::effects::{Action, Moment};
+use crate::effects::{Action, MotionSample as Moment};
 
 use super::kernel::Kernel;
 use super::trace::Pair;
@@ -79,8 +79,8 @@ pub(super) fn extend(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effects::{EffectKind, KINDS, Machine, MachineKind};
-    use crate::model_file::Model;
+    use crate::effects::{EffectKind, KINDS, Machine};
+    use crate::model::{MachineKind, Model};
     use crate::refine::robot::motion::of_action;
 
     /// Against the laws themselves, row by row.

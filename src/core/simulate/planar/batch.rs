@@ -214,7 +214,7 @@ impl<'a, S: Simd> Group<'a, S> {
         )
     }
 
-    /// Whether the margin of [`PlanarPlant`] is at least 0.
+    /// Returns whether the margin of [`PlanarPlant`] is at least 0.
     #[inline(always)]
     fn phase_goes_on(&self, next: &Motion<Lanes<S>>) -> Mask<S> {
         let Self { laws, loads, near, phases, .. } = self;
@@ -300,7 +300,7 @@ struct Tables<'a, S: Simd> {
 
 impl<S: Simd> Level<Lanes<S>> for Tables<'_, S> {
     #[inline(always)]
-    fn level_nm(&self, speed: Lanes<S>) -> Lanes<S> {
+    fn amplitude_nm(&self, speed: Lanes<S>) -> Lanes<S> {
         let mut magnitude = speed.abs();
         if let Some(stuck) = self.stuck {
             // Rest is outside of the tables, which costs time.

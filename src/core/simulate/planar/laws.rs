@@ -7,7 +7,7 @@
 //! - held shafts, q̈ = 0: (c₁r + c₃ + 2c₂ cos θ) θ̈ = a + b.
 
 use super::number::Number;
-use crate::robot::RobotParameters;
+use crate::model::RobotParameters;
 
 /// q, q̇, θ, θ̇.
 #[derive(Clone, Copy, Debug)]
@@ -18,7 +18,7 @@ pub(super) struct Motion<N = f64> {
     pub(super) pitch_rate: N,
 }
 
-/// The robot without its friction's level, which depends on speed in a way of its own.
+/// The robot without its friction's level, which depends on speed in a separate way.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Laws<N = f64> {
     pub(super) radius_m: N,
@@ -37,7 +37,7 @@ pub(super) struct Laws<N = f64> {
     pub(super) offset_nm: N,
 }
 
-/// What acts on the robot during one tick.
+/// Inputs of the robot during one sample.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Loads<N = f64> {
     /// ΣT before friction, N m.
@@ -50,7 +50,7 @@ pub(super) struct Loads<N = f64> {
 
 /// Friction level at a speed's magnitude, N m, summed over both motors.
 pub(super) trait Level<N> {
-    fn level_nm(&self, speed: N) -> N;
+    fn amplitude_nm(&self, speed: N) -> N;
 }
 
 impl Laws {
@@ -85,7 +85,7 @@ impl<N: Number> Laws<N> {
         direction: N,
         friction: &impl Level<N>,
     ) -> (N, N) {
-        let level = friction.level_nm(at.speed);
+        let level = friction.amplitude_nm(at.speed);
         let (a, b) = self.own(loads, (sin, cos), at.pitch_rate);
         let c5_cos = self.c5 * cos;
         let (by_along, by_about) = (self.c3_per_radius + c5_cos, self.c1 + c5_cos);

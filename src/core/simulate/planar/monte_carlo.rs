@@ -13,10 +13,9 @@ use super::plant::{Forcing, PlanarPlant};
 use super::running::RunningStatistics;
 use crate::ParameterError;
 use crate::control::{BalanceController, Measurement, Reference};
-use crate::model_file::RobotModel;
+use crate::model::{RobotModel, State, Surroundings};
 use crate::parallel;
 use crate::parameter::within;
-use crate::robot::{State, Surroundings};
 
 /// Robots that are simulated side by side: so many that few are left over when vectors are filled, so few that
 /// their friction tables stay close to the processor.
@@ -38,7 +37,7 @@ pub struct Trial {
     pub seed: u64,
 }
 
-/// What came of a trial.
+/// Outcome of a trial.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrialOutcome {
     /// Statistics of the true state at every tick of 1 ms.

@@ -25,7 +25,7 @@ impl NearAngle {
         if self.reaches(angle) { self.rotated(angle) } else { libm::sincos(angle) }
     }
 
-    /// Whether the series serves for an angle.
+    /// Returns whether the series serves for an angle.
     #[inline(always)]
     pub(super) fn reaches(&self, angle: f64) -> bool {
         (angle - self.angle).abs() <= REACH_RAD

@@ -1,4 +1,4 @@
-//! What the laws of motion are written in: one robot's number, or those of several robots side by side.
+//! Number types of the laws of motion: one robot's number, or those of several robots side by side.
 
 use std::ops::{Add, Div, Mul, Sub};
 

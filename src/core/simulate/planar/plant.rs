@@ -10,7 +10,7 @@
 //! no events but is of first order; events are rare here, and order 4 keeps energy to rounding.
 //!
 //! A step is a chain in which each stage waits for the friction at the speed that the stage before gave; what
-//! else a stage needs (sine, cosine, one division) depends on earlier stages only and runs beside it. So
+//! else a stage needs (sine, cosine, one division) depends on earlier stages only and runs next to it. So
 //! the chain is kept short: table, cubic, one product and one difference.
 
 use std::ops::RangeInclusive;
@@ -20,9 +20,9 @@ use super::laws::{Laws, Loads, Motion, runge_kutta};
 use super::near_angle::NearAngle;
 use super::sliding::SlidingFriction;
 use crate::friction::Stribeck;
-use crate::robot::{RobotParameters, State};
+use crate::model::{RobotParameters, State};
 
-/// What acts on the robot, constant during a step.
+/// Inputs of the robot, constant during a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Forcing {
     /// Torque of the left and the right motor before friction, N m.
@@ -38,7 +38,7 @@ pub struct Forcing {
 pub struct PlanarPlant {
     pub(super) laws: Laws,
     pub(super) sliding: SlidingFriction,
-    /// Sum of both motors' ranges at rest, N m; none where no torque is needed to turn a resting shaft.
+    /// Sum of both motors' ranges at standstill, N m; `None` if no torque is needed to turn a resting shaft.
     pub(super) stick_range_nm: Option<RangeInclusive<f64>>,
     pub(super) motion: Motion,
     pub(super) phase: Phase,
@@ -47,7 +47,7 @@ pub struct PlanarPlant {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Phase {
-    /// Friction without a range at rest: one continuous law for all speeds.
+    /// Friction without a range at standstill: one continuous law for all speeds.
     Free,
     /// The shafts turn forward (1) or backward (−1).
     Slide(f64),
@@ -101,7 +101,7 @@ impl PlanarPlant {
         self.motion.speed
     }
 
-    /// Whether friction holds the shafts.
+    /// Returns whether friction holds the shafts.
     pub fn stuck(&self) -> bool {
         self.phase == Phase::Stuck
     }
@@ -202,7 +202,7 @@ impl PlanarPlant {
         }
     }
 
-    /// Share of the step `dt` at which the phase has just ended, for a step at the end of which it has (`end`).
+    /// Fraction of the step `dt` at which the phase has just ended, for a step at the end of which it has (`end`).
     #[cold]
     #[inline(never)]
     fn locate_change(&self, loads: &Loads, dt: f64, end: &Motion) -> f64 {

@@ -2,7 +2,7 @@
 
 use super::super::simulation::TICK_S;
 use super::super::statistics::{SETTLED_RANGE_M, SETTLED_WINDOW_S, STATISTICS_FROM_S, Statistics, Summary};
-use crate::robot::State;
+use crate::model::State;
 
 /// [`Statistics`] of states at every tick of 1 ms, up to rounding the same as of their samples.
 #[derive(Clone, Debug)]

@@ -43,7 +43,7 @@ impl SlidingFriction {
     /// still or already 0.
     #[inline(always)]
     pub(in crate::simulate) fn torque_nm(&self, speed_rad_s: f64, direction: f64) -> f64 {
-        direction * self.level_nm(speed_rad_s) + (self.viscous_nm_s_rad * speed_rad_s + self.offset_nm)
+        direction * self.amplitude_nm(speed_rad_s) + (self.viscous_nm_s_rad * speed_rad_s + self.offset_nm)
     }
 
     /// The cubic that serves at a speed of at least 0; none outside of the table.
@@ -52,7 +52,7 @@ impl SlidingFriction {
         self.cells.get((speed.to_bits().wrapping_sub(LOWEST_BITS) >> WITHIN_BITS) as usize)
     }
 
-    /// The same with a constant outside of the table.
+    /// Same with a constant outside of the table.
     #[inline(always)]
     pub(super) fn cell_or_constant(&self, speed: f64) -> [f64; 4] {
         match self.cell(speed) {
@@ -70,7 +70,7 @@ impl SlidingFriction {
 
 impl Level<f64> for SlidingFriction {
     #[inline(always)]
-    fn level_nm(&self, speed: f64) -> f64 {
+    fn amplitude_nm(&self, speed: f64) -> f64 {
         let speed = speed.abs();
         match self.cell(speed) {
             Some(cubic) => level(cubic, within(speed)),
@@ -82,7 +82,7 @@ impl Level<f64> for SlidingFriction {
 /// Bits of a speed that name its place within a cell.
 pub(super) const WITHIN_MASK: u64 = (1 << WITHIN_BITS) - 1;
 
-/// How far a speed is above the lower end of its cell, rad/s.
+/// Distance of a speed from the lower end of its cell, rad/s.
 #[inline(always)]
 fn within(speed: f64) -> f64 {
     speed - f64::from_bits(speed.to_bits() & !WITHIN_MASK)
@@ -96,7 +96,7 @@ pub(super) fn level<N: Number>([a, c, b, d]: &[N; 4], t: N) -> N {
 }
 
 fn exact_level_nm(curves: &[Stribeck], speed: f64) -> f64 {
-    curves.iter().map(|curve| curve.level_nm(speed)).sum()
+    curves.iter().map(|curve| curve.amplitude_nm(speed)).sum()
 }
 
 /// Speed, rad/s, level, N m, and its slope, N m s/rad, at an end of a cell.

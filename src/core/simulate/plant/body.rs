@@ -1,6 +1,6 @@
 //! Everything above the axle as one rigid body, its payload included.
 
-use crate::robot::{Payload, RobotParameters};
+use crate::model::{Payload, RobotParameters};
 
 /// Body and payload.
 #[derive(Clone, Copy, Debug, PartialEq)]

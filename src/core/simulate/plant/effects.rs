@@ -1,8 +1,8 @@
 //! The effects of the model on the robot in motion.
 
 use super::{Phase, Plant};
-use crate::effects::{Action, Machine, Moment, RobotLaws};
-use crate::model_file::RobotModel;
+use crate::effects::{Action, Machine, MotionSample, RobotLaws};
+use crate::model::RobotModel;
 
 /// Laws with what they have to remember of the motion.
 #[derive(Clone, Debug)]
@@ -27,7 +27,7 @@ impl Effects {
         (!laws.is_empty()).then(|| Box::new(Self { laws, time_s: 0.0, before: None }))
     }
 
-    /// What they do over the next substep: as of its middle, to which the motion is carried on with the accelerations
+    /// Action over the next substep: as of its middle, to which the motion is carried on with the accelerations
     /// of the last one.
     pub(super) fn act(&mut self, plant: &Plant, torque_nm: [f64; 2], step: f64) -> ([Action; 2], Action) {
         let pose = plant.pose();
@@ -42,7 +42,7 @@ impl Effects {
         let middle = |value: f64, speed: f64| value + half * speed;
         let x_accel_m_s2 = rate(now.forward, before.forward);
         let pitch_accel_rad_s2 = rate(now.pitch, before.pitch);
-        let whole = Moment {
+        let whole = MotionSample {
             time_s: self.time_s + half,
             dt_s: step,
             torque_sum_nm: torque_nm[0] + torque_nm[1],
@@ -52,12 +52,12 @@ impl Effects {
             pitch_rad: middle(pose.state.pitch_rad, now.pitch),
             pitch_rate_rad_s: middle(now.pitch, pitch_accel_rad_s2),
             pitch_accel_rad_s2,
-            ..Moment::default()
+            ..MotionSample::default()
         };
         let moments = [0, 1].map(|i: usize| {
             let held = plant.phases[i] == Phase::Stuck;
             let acceleration = if held { 0.0 } else { rate(now.motor[i], before.motor[i]) };
-            Moment {
+            MotionSample {
                 motor_angle_rad: middle(plant.motor_angle_rad()[i], now.motor[i]),
                 motor_speed_rad_s: middle(now.motor[i], acceleration),
                 motor_accel_rad_s2: acceleration,

@@ -1,15 +1,15 @@
 //! Newton's laws for the whole robot: from where it is and what acts on it to its accelerations.
 
-use super::super::ground::Ground;
 use super::super::planar::Forcing;
 use super::super::planar::near_angle::NearAngle;
 use super::Pose;
 use super::body::Body;
 use super::motion::Motion;
 use super::terrain::{Footing, Place, Terrain};
-use crate::robot::{Chassis, RobotParameters, State, Surroundings, Tether};
+use crate::model::Ground;
+use crate::model::{Chassis, RobotParameters, State, Surroundings, Tether};
 
-/// What does not change as the robot moves.
+/// Constants of the motion.
 #[derive(Clone, Debug)]
 pub(super) struct Laws {
     radius_m: f64,
@@ -35,14 +35,14 @@ pub(super) struct Laws {
     /// Angle of the centre of mass in front of the body's axis, with its sine and cosine.
     com_angle: f64,
     com_direction: (f64, f64),
-    /// What is added to r (q + lean) to give the way of a wheel, m: motor angles are 0 upright at x = 0.
+    /// Offset of a wheel's distance from r (q + lean), m: motor angles are 0 upright at x = 0.
     origin_m: f64,
     tether: Option<Tether>,
-    /// None on level ground, whose steps need none of it.
+    /// `None` on level ground.
     terrain: Option<Terrain>,
 }
 
-/// What acts during one call, with the angles at its start.
+/// Inputs during one call, with the angles at its start.
 #[derive(Clone, Copy)]
 pub(super) struct Loads {
     pub(super) torque_nm: [f64; 2],
@@ -74,7 +74,8 @@ pub(super) struct Response {
 }
 
 impl Loads {
-    /// The same with what effects add: torques inside both motors, a force at the axle and a torque on the body.
+    /// Same with the contributions of effects: torques inside both motors, a force at the axle and a torque on the
+    /// body.
     pub(super) fn with(&self, motors_nm: [f64; 2], axle_n: f64, body_nm: f64) -> Self {
         Self {
             torque_nm: [0, 1].map(|i: usize| self.torque_nm[i] + motors_nm[i]),
@@ -257,7 +258,7 @@ impl Laws {
         self.terrain.as_ref().is_some_and(|terrain| !terrain.is_level())
     }
 
-    /// Whether the ground is one level plane.
+    /// Returns whether the ground is one level plane.
     pub(super) fn is_even(&self) -> bool {
         self.terrain.is_none()
     }
@@ -342,7 +343,7 @@ impl Laws {
         self.terrain.as_ref().map_or((0.0, 1.0), |terrain| terrain.tilt(self.distances(at)))
     }
 
-    /// Kinetic and potential energy, J: 0 when upright at rest on level ground at height 0 without payload.
+    /// Kinetic and potential energy, J: 0 when upright at standstill on level ground at height 0 without payload.
     pub(super) fn energy_j(&self, at: &Motion) -> f64 {
         let lean = libm::sincos(at.lean);
         let place = self.place(at, lean, libm::sincos(self.yaw(at)));

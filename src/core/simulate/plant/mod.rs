@@ -2,7 +2,7 @@
 //!
 //! # Dynamics
 //! The wheels roll without slip, neither along nor across: the axle's middle moves at v along the heading,
-//! the body pitches at θ̇ and turns at ψ̇. With the notation of [`crate::robot`], b the track, J_ψ the body
+//! the body pitches at θ̇ and turns at ψ̇. With the notation of [`crate::model`], b the track, J_ψ the body
 //! about the vertical, γ the slope of the path, β = θ + γ, A = M + 2m + 2I/r² and D = J + M l²:
 //! - A v̇ + M l cos β θ̈ = M l sin β (θ̇² + ψ̇²) + ΣT/r + Q_v
 //! - M l cos β v̇ + D θ̈ = M l sin β (l cos β ψ̇² + v γ̇) − ΣT + Q_θ
@@ -16,7 +16,7 @@
 //!
 //! # Effects
 //! - Gravity on the slope of the surroundings, a plane: ahead and across change places as the robot turns.
-//! - A ground of its own under each wheel: what each wheel climbs brakes that wheel, their difference turns
+//! - a separate ground under each wheel: what each wheel climbs brakes that wheel, their difference turns
 //!   the robot and rolls it by asin((z_r − z_l)/b), which takes cos(roll) of the weight's moment and shifts
 //!   weight to the lower wheel; the path's curvature.
 //! - A push on the body along the path, a tether, a payload, which moves the centre of mass.
@@ -44,10 +44,9 @@ mod shafts;
 mod terrain;
 
 use super::change::{MAX_CHANGES, first_below_zero};
-use super::ground::Ground;
 use super::planar::Forcing;
-use crate::model_file::RobotModel;
-use crate::robot::State;
+use crate::model::Ground;
+use crate::model::{RobotModel, State};
 use effects::Effects;
 use laws::{Laws, Loads};
 use motion::{Motion, Smooth, runge_kutta};
@@ -63,7 +62,7 @@ pub struct Plant {
     effects: Option<Box<Effects>>,
 }
 
-/// Where the robot is, and how it stands and moves: the truth behind the sensors.
+/// State of the robot: the truth behind the sensors.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pose {
     /// State along the path; x is the way of the axle's middle.
@@ -96,7 +95,7 @@ impl Plant {
         Self::on_ground(robot, &[const { Ground::flat() }; 2], start)
     }
 
-    /// The same with a ground of its own under the left and the right wheel, on top of the surroundings'
+    /// Creates it with separate ground under the left and the right wheel, in addition to the surroundings'
     /// slope; one that is flat leaves the surroundings' ground.
     pub fn on_ground(robot: &RobotModel, grounds: &[Ground; 2], start: &State) -> Self {
         let grounds = Self::grounds_under(robot, grounds);
@@ -153,7 +152,7 @@ impl Plant {
         pulp::Arch::new().dispatch(Advance { plant: self, loads, step, substeps });
     }
 
-    /// The same where effects act, which are held over each substep at what they are in its middle.
+    /// Step with effects, which are held constant over each substep at their value in its middle.
     #[cold]
     #[inline(never)]
     fn advance_with_effects(&mut self, loads: &Loads, step: f64, substeps: u32) {
@@ -194,17 +193,17 @@ impl Plant {
         self.motion.speed
     }
 
-    /// Whether friction holds the shafts.
+    /// Returns whether friction holds the shafts.
     pub fn stuck(&self) -> [bool; 2] {
         self.phases.map(|phase| phase == Phase::Stuck)
     }
 
-    /// Kinetic and potential energy, J; 0 when upright at rest.
+    /// Kinetic and potential energy, J; 0 when upright at standstill.
     pub fn energy_j(&self) -> f64 {
         self.laws.energy_j(&self.motion)
     }
 
-    /// Whether every coordinate and speed is a finite number.
+    /// Returns whether every coordinate and speed is a finite number.
     pub fn is_finite(&self) -> bool {
         self.motion.is_finite()
     }
@@ -290,7 +289,7 @@ impl Plant {
         }
     }
 
-    /// Takes shafts at rest as stuck.
+    /// Takes shafts at standstill as stuck.
     fn rest(&mut self) {
         for (phase, speed) in self.phases.iter_mut().zip(self.motion.speed) {
             if *phase != Phase::Free && speed == 0.0 {
@@ -329,7 +328,7 @@ impl<const UNEVEN: bool> Smooth for InPhases<'_, UNEVEN> {
     }
 }
 
-/// The same where no shaft is held.
+/// Accelerations if no shaft sticks.
 struct Turning<'a, const UNEVEN: bool> {
     plant: &'a Plant,
     loads: &'a Loads,
@@ -344,7 +343,7 @@ impl<const UNEVEN: bool> Smooth for Turning<'_, UNEVEN> {
     }
 }
 
-/// Whether a margin says that a phase has ended. One that is not a number does not: such a motion is past all
+/// Returns whether a margin says that a phase has ended. One that is not a number does not: such a motion is past all
 /// phases.
 fn ended(margin: f64) -> bool {
     margin < 0.0

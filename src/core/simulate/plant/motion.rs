@@ -1,4 +1,4 @@
-//! Where the robot is and how fast, and one step of order 4.
+//! Position and velocity of the robot, and one Runge-Kutta step of order 4.
 
 use super::laws::Response;
 

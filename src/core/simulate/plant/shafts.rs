@@ -6,10 +6,10 @@ use super::super::planar::sliding::SlidingFriction;
 use super::laws::Response;
 use crate::friction::Stribeck;
 
-/// What a shaft does.
+/// State of a shaft.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Phase {
-    /// Friction without a range at rest: one continuous law for all speeds.
+    /// Friction without a range at standstill: one continuous law for all speeds.
     Free,
     /// Turns forward (1) or backward (−1).
     Slide(f64),
@@ -23,7 +23,7 @@ pub(super) type Phases = [Phase; 2];
 #[derive(Clone, Debug)]
 pub(super) struct Shaft {
     sliding: SlidingFriction,
-    /// Torques that friction can take at rest, N m; none where no torque is needed to turn a resting shaft.
+    /// Torques that friction can take at standstill, N m; `None` if no torque is needed to turn a resting shaft.
     range_nm: Option<RangeInclusive<f64>>,
     /// Level of dry friction on top of the curve's, N m.
     added_nm: f64,
@@ -50,8 +50,8 @@ impl Shaft {
     }
 
     /// Adds dry friction to the curve's from now on; no level gets below 0.
-    pub(super) fn add(&mut self, level_nm: f64) {
-        self.added_nm = if level_nm < self.least_nm { self.least_nm } else { level_nm };
+    pub(super) fn add(&mut self, amplitude_nm: f64) {
+        self.added_nm = if amplitude_nm < self.least_nm { self.least_nm } else { amplitude_nm };
     }
 
     /// Phase of a shaft that turns at a speed or rests.
@@ -97,7 +97,7 @@ pub(super) fn shaft_torques(
     [0, 1].map(|i: usize| if stuck[i] { response.holding_one(i, turning[1 - i]) } else { turning[i] })
 }
 
-/// The same where both shafts turn.
+/// Accelerations if both shafts turn.
 #[inline(always)]
 pub(super) fn turning_torques(
     shafts: &[Shaft; 2],

@@ -1,4 +1,4 @@
-//! What gravity does on uneven and sloped ground.
+//! Gravity on uneven and sloped ground.
 //!
 //! The ground under each wheel is a height over that wheel's own path; below both lies a plane with a slope
 //! up the way x points at heading 0. The forces are the derivatives of the potential energy
@@ -6,8 +6,8 @@
 //! with sin ρ = (z_r − z_l)/b the roll against the plane, X the way up the slope and θ from the plane's
 //! normal, so that energy is kept exactly.
 
-use super::super::ground::{Ground, Path, Under};
 use super::body::Body;
+use crate::model::{Ground, GroundPath, Under};
 
 /// Farthest roll, as its sine: a robot beyond it has fallen over, which this model cannot show.
 const FARTHEST_ROLL: f64 = 0.9;
@@ -15,7 +15,7 @@ const FARTHEST_ROLL: f64 = 0.9;
 /// Ground that is not one level plane.
 #[derive(Clone, Debug)]
 pub(super) struct Terrain {
-    paths: [Path; 2],
+    paths: [GroundPath; 2],
     slope: (f64, f64),
     track_m: f64,
     /// m g cos α and M g cos α, N.
@@ -28,7 +28,7 @@ pub(super) struct Terrain {
     downhill_nm: f64,
 }
 
-/// Where the robot stands.
+/// Position of the robot on the ground.
 pub(super) struct Place {
     pub(super) distance: [f64; 2],
     pub(super) wheel_speed: [f64; 2],
@@ -36,7 +36,7 @@ pub(super) struct Place {
     pub(super) yaw: (f64, f64),
 }
 
-/// What the ground does to the robot.
+/// Forces of the ground on the robot.
 pub(super) struct Footing {
     /// Sine and cosine of the path's slope, mean of both wheels, and its rate, rad/s.
     pub(super) tilt: (f64, f64),
@@ -60,7 +60,7 @@ impl Terrain {
         let (sin, cos) = slope;
         let lever = body.mass_kg * body.com_distance_m * gravity;
         Self {
-            paths: grounds.map(Path::new),
+            paths: grounds.map(GroundPath::new),
             slope,
             track_m,
             wheel_weight_n: wheel_mass_kg * gravity * cos,
@@ -71,7 +71,7 @@ impl Terrain {
         }
     }
 
-    /// Whether the plane below is level.
+    /// Returns whether the plane below is level.
     pub(super) fn is_level(&self) -> bool {
         self.slope.0 == 0.0
     }

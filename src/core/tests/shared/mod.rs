@@ -1,7 +1,9 @@
-//! Measured data and given examples, which lie beside the repository: tests read them where they are at hand, and fail
-//! without them only where `FLQR_REQUIRE_SHARED` is set.
+//! Measured data and given examples in a folder next to the repository. Without the folder, tests that need it are skipped
+//! and reported, and fail if `FLQR_REQUIRE_SHARED` is set.
 //!
-//! The core's own tests take this file in too.
+//! The unit tests of the core include this file too.
+
+mod skip;
 
 use std::fs::File;
 use std::io::{BufReader, Read};
@@ -15,7 +17,7 @@ fn open(name: &str) -> Option<File> {
     let file = File::open(&path);
     if file.is_err() {
         assert!(std::env::var_os("FLQR_REQUIRE_SHARED").is_none(), "{path} is absent");
-        println!("skipped: {path} is absent");
+        skip::report_skipped(&format!("put {name} into the folder ../shared/data next to the checkout"));
     }
     file.ok()
 }

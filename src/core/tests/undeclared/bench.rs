@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use flqr_core::model_file::Model;
+use flqr_core::model::Model;
 use flqr_core::record::Log;
 use flqr_core::refine::{Options, Refinement, Verdict, refine};
 
@@ -17,7 +17,7 @@ fn refined(case: &BenchCase) -> Refinement {
     refine(&model, &[log(false)], &[log(true)], &options, &mut |_| ControlFlow::Continue(())).unwrap()
 }
 
-/// Whether an effect is among what was named, or told to look the same.
+/// Returns whether an effect is among what was named, or told to look the same.
 fn has(found: &Refinement, id: &str) -> bool {
     let is = |kind: &str| kind == id;
     found

@@ -13,9 +13,9 @@ mod shared;
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
 
-use flqr_core::model_file::Model;
+use flqr_core::model::Model;
 use flqr_core::record::{Log, Severity};
-use flqr_core::refine::{Fate, Options, Refinement, Verdict, refine};
+use flqr_core::refine::{Options, Outcome, Refinement, Verdict, refine};
 use generator::fault::Fault;
 use generator::{Case, Conditions, cases};
 use shared::{shared_log, shared_text};
@@ -55,14 +55,14 @@ fn effects_are_named_with_their_sizes() {
     }
 }
 
-/// Cases judged side by side.
+/// Cases assessed side by side.
 fn judged(cases: Vec<Case>) -> Vec<(Case, Refinement)> {
     let threads = NonZeroUsize::new(2).unwrap();
     let found = flqr_core::parallel::map(&cases, threads, |case| refined(case, log(case)));
     cases.into_iter().zip(found).collect()
 }
 
-/// Whether the robot's effect is among those named or those that cannot be told from one.
+/// Returns whether the robot's effect is among those named or those that cannot be distinguished from one.
 fn is_named(fault: &Fault, found: &Refinement) -> bool {
     found.effects.iter().any(|effect| {
         let others = effect.ambiguous_with.iter().map(|kind| kind.id);
@@ -166,7 +166,7 @@ fn what_was_tried_is_told() {
     let case = Case { faults: vec![Fault::Tether { n_m: 12.0, anchor: 0.0 }], ..cases::clean(3, 0.0) };
     let found = refined(&case, log(&case));
     let first = &found.candidates[0];
-    assert_eq!((first.kind.id, &first.fate), ("tether_spring", &Fate::Added));
+    assert_eq!((first.kind.id, &first.outcome), ("tether_spring", &Outcome::Added));
     assert!(first.gain_percent > 10.0 && first.z > 5.0, "{first:?}");
     let gains: Vec<f64> = found.candidates.iter().map(|tried| tried.gain_percent).collect();
     assert!(found.candidates.len() > 1 && gains[0] >= gains[1], "{gains:?}");

@@ -1,11 +1,11 @@
-//! What an export of a stack is made of.
+//! Contents of an export of a stack.
 
 use super::{Panel, Stack, cache, indexed};
 use crate::plot::export::{Figure, FigureKind};
 use crate::plot::figure;
 
 impl Stack {
-    /// What is to be written of the visible range.
+    /// Export of the visible range.
     pub(super) fn figure(&mut self, shown: &[&Panel<'_>], kind: FigureKind) -> Figure {
         let (range, units) = (self.view.range(), self.units);
         match kind {

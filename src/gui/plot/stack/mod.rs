@@ -2,9 +2,9 @@
 //! cursors, readings, statistics, spectra, a second axis, units, limits and exports by one call.
 
 mod content;
+mod phrases;
 mod rows;
 mod tools;
-mod words;
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
@@ -28,7 +28,7 @@ pub struct Panel<'a> {
     pub unit: Unit,
     /// The vertical range is at least this long, in the core's unit.
     pub min_span: f64,
-    /// Whether it is shown until the user chooses.
+    /// True if it is shown until the user chooses.
     pub shown: bool,
     /// Curves, the later ones drawn over the earlier ones.
     pub curves: Vec<PanelCurve<'a>>,
@@ -64,7 +64,7 @@ impl Panel<'_> {
     }
 }
 
-/// What the page has to do for a stack.
+/// Requests of a stack to its page.
 #[derive(Debug, Default, PartialEq)]
 #[must_use]
 pub struct Wishes {
@@ -72,9 +72,9 @@ pub struct Wishes {
     pub dialog: Option<FigureFile>,
     /// Say this, or complain of it.
     pub said: Option<Result<String, String>>,
-    /// What the user did to marks.
+    /// User actions on marks.
     pub moved: Moved,
-    /// How far a drag has moved a curve, where [`Stack::drag_moves_curve`] is set.
+    /// Displacement of a curve by a drag, where [`Stack::drag_moves_curve`] is set.
     pub shift: f64,
 }
 
@@ -101,13 +101,13 @@ pub struct Stack {
     pub view: TimeView,
     /// The units that are shown; degrees are all of the window's.
     units: UnitChoice,
-    /// Whether there is a newest sample to follow.
+    /// True if there is a newest sample to follow.
     is_live: bool,
     /// Label of the horizontal axis, and the column of it in an exported log.
     pub x: [&'static str; 2],
-    /// Where the curves come from, a line each; every export says so.
+    /// Sources of the curves, one line each, included in every export.
     pub sources: Vec<String>,
-    /// Whether a drag is for a curve, and not for the visible range.
+    /// True if a drag is for a curve, and not for the visible range.
     pub drag_moves_curve: bool,
     cursors: Option<Cursors>,
     spectra: Option<Spectra>,
@@ -124,7 +124,7 @@ pub struct Stack {
     focus: Option<egui::Id>,
 }
 
-/// What the plots of a stack share while they are drawn.
+/// Common data of the plots of a stack while they are drawn.
 struct Around<'m, 'p> {
     marks: Option<&'m mut Marks>,
     all: &'p [Panel<'p>],
@@ -161,7 +161,7 @@ impl Stack {
         Self { is_live: true, ..Self::new(name, span) }
     }
 
-    /// Whether the arrow keys belong to the cursors.
+    /// Returns whether the arrow keys belong to the cursors.
     pub fn has_cursors(&self) -> bool {
         self.cursors.is_some() && self.spectra.is_none()
     }
@@ -182,7 +182,7 @@ impl Stack {
         self.view.show_all(limits);
     }
 
-    /// What the stack shows, for scripts.
+    /// State of the stack for scripts.
     pub fn snapshot(&self) -> serde_json::Value {
         serde_json::json!({
             "range": self.view.range(),
@@ -204,7 +204,7 @@ impl Stack {
         self.show_marked(ui, panels, None)
     }
 
-    /// The same with marks of the page, which the stack's own cursors come before.
+    /// Same with marks of the page, which are drawn below the cursors of the stack.
     pub fn show_marked(&mut self, ui: &mut Ui, panels: &[Panel<'_>], marks: Option<&mut Marks>) -> Wishes {
         self.units.degrees = degrees(ui.ctx());
         let asked = self.export.ui(ui, self.name);
@@ -216,7 +216,7 @@ impl Stack {
         self.keys(ui, &shown);
         let top = ui.next_widget_position();
         if shown.is_empty() {
-            ui.weak("No signal is chosen: see Signals.");
+            ui.weak("No signal is selected. See Signals.");
         } else if self.spectra.is_some() {
             self.spectra_ui(ui, &shown);
         } else {
@@ -233,7 +233,7 @@ impl Stack {
         wishes
     }
 
-    /// Whether an export may be asked for, and [`Stack::sources`] is of use.
+    /// Returns whether an export may be requested, and [`Stack::sources`] is of use.
     pub fn exports(&self) -> bool {
         self.export.open
     }

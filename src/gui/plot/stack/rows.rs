@@ -19,7 +19,7 @@ const LEAST_HEIGHT: f32 = 30.0;
 /// The room of one plot.
 struct Frame {
     height: f32,
-    /// Whether the horizontal axis is below it.
+    /// True if the horizontal axis is below it.
     last: bool,
     room: Right,
 }
@@ -73,7 +73,7 @@ impl Stack {
         }
     }
 
-    /// What every plot has at its right, so that all are equally wide.
+    /// Right margin of every plot, so that all have the same width.
     fn room(&self, shown: &[&Panel<'_>]) -> Right {
         let any = shown.iter().any(|panel| self.second.contains_key(&*panel.name));
         if any { Right::Room } else { Right::Nothing }
@@ -173,7 +173,7 @@ impl Stack {
         shown.response.accessible_name(self.summary(row));
     }
 
-    /// What the pointer does in a plot.
+    /// Pointer actions in a plot.
     fn react(&mut self, ui: &Ui, shown: &PlotResponse<()>, around: &mut Around<'_, '_>) {
         let (response, transform) = (&shown.response, &shown.transform);
         let held = self.cursors.as_mut().is_some_and(|cursors| cursors.interact(ui, response, transform));

@@ -15,18 +15,16 @@ impl Stack {
     /// The tools, for a row above the plots.
     pub fn tools_ui(&mut self, ui: &mut Ui, panels: &[Panel<'_>]) {
         if self.is_live {
-            ui.toggle_value(&mut self.view.follow, "Follow").on_hover_text(
-                "Keep the newest sample in view (End). Dragging a plot holds it, while recording goes on.",
-            );
+            ui.toggle_value(&mut self.view.follow, "Follow")
+                .on_hover_text("Follow the newest sample (End). Dragging a plot stops following.");
         }
         let mut on = self.cursors.is_some();
-        let help =
-            "Two cursors on all plots: differences, mean, RMS, peaks, overshoot and settling between them";
+        let help = "Two cursors on all plots: difference, mean, RMS, peaks, overshoot and settling time";
         if ui.toggle_value(&mut on, "Cursors").on_hover_text(help).clicked() {
             self.cursors = on.then(|| Cursors::within(self.view.range()));
         }
         let mut on = self.spectra.is_some();
-        let help = "Amplitude spectrum or spectral density of the visible range, in place of its course";
+        let help = "Show the amplitude spectrum or power spectral density of the visible range";
         if ui.toggle_value(&mut on, "Spectrum").on_hover_text(help).clicked() {
             self.spectra = on.then(Spectra::default);
         }
@@ -36,7 +34,7 @@ impl Stack {
         if panels.len() > 1 {
             ui.menu_button("Signals", |ui| self.signals_ui(ui, panels))
                 .response
-                .on_hover_text("Choose what is plotted, and what has a second axis");
+                .on_hover_text("Choose the plotted signals and the second axis");
         }
         self.units_ui(ui, panels);
         ui.toggle_value(&mut self.export.open, "Export")
@@ -79,7 +77,7 @@ impl Stack {
             ui.scope(|ui| {
                 let choices = [
                     (false, "N m", "Torques"),
-                    (true, "A", "Motor currents, by the torque constant of the model's [link]"),
+                    (true, "A", "Motor currents, from the torque constant in [link] of the model"),
                 ];
                 choice_ui(ui, &mut self.units.amperes, &choices);
             });

@@ -1,4 +1,4 @@
-//! Measured against the model, and what the difference depends on.
+//! Difference between measurement and model, and the variables it depends on.
 
 mod in_time;
 mod over;
@@ -27,12 +27,12 @@ pub(super) struct ResidualStep {
     over: Over,
 }
 
-/// Whether there are plots of what was found.
+/// Returns whether there are plots of what was found.
 pub(super) fn has_plots(refined: Option<&Answered<Box<Refinement>>>) -> bool {
     refined.is_some_and(|found| !found.answer.explorer.before.is_empty())
 }
 
-/// How this step stands.
+/// State of this step.
 pub(super) fn state(
     refined: Option<&Answered<Box<Refinement>>>,
     residual: Option<&Answered<Box<Residual>>>,
@@ -42,7 +42,7 @@ pub(super) fn state(
     let errors = match (newer, refined) {
         (Some(residual), _) => &residual.answer.errors,
         (None, Some(found)) => &found.answer.before,
-        (None, None) => return StepState::new("not worked out", Tone::Open),
+        (None, None) => return StepState::new("not computed", Tone::Open),
     };
     let (Some((_, rmse)), floor) = (errors.rmse.0.first(), errors.noise_floor.main()) else {
         return StepState::new("none", Tone::Open);
@@ -72,10 +72,10 @@ impl ResidualStep {
                 self.pictures_ui(explorer, sources, room.max(LEAST_HEIGHT), commands, ui);
             }
             if let Some(residual) = residual {
-                section_ui(ui, "How far the model is", |_| {});
+                section_ui(ui, "Residual", |_| {});
                 compare::residual_ui(&residual.answer, ui);
                 if refined.is_none() {
-                    hint_ui(ui, "“Find what is missing” brings the pictures of the residual.");
+                    hint_ui(ui, "Use “Find missing effects” to get the plots of the residual.");
                 }
             }
         });
@@ -95,7 +95,7 @@ impl ResidualStep {
         self.over.suggest(explorer, generation);
         let Some((_, in_time)) = &mut self.in_time else { return };
         let start = ui.cursor().top();
-        section_ui(ui, "Measured against the model", |ui| {
+        section_ui(ui, "Measured minus model", |ui| {
             if ui.button("Whole log").on_hover_text("Show all rows (double click)").clicked() {
                 in_time.show_all();
             }

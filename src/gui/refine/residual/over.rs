@@ -5,8 +5,9 @@ use std::f64::consts::TAU;
 use egui::{ComboBox, Ui, Vec2, vec2};
 use egui_plot::{FilledArea, Line, MarkerShape, Plot, PlotPoint, PlotPoints, Points};
 use flqr_core::refine::{Explorer, Variable};
+use flqr_core::signal::{Band, Bin, binned};
 
-use crate::plot::{Axes, Band, Bin, binned};
+use crate::plot::Axes;
 use crate::theme::palette;
 use crate::widgets::{choice_ui, hint_ui, shown};
 
@@ -19,13 +20,13 @@ const MOST_BINS: usize = 90;
 struct Choice {
     /// Name of the variable.
     variable: String,
-    /// Whether an angle is taken modulo a turn.
+    /// True if an angle is taken modulo a turn.
     folded: bool,
     held_out: bool,
     band: Band,
 }
 
-/// What is drawn, kept until the choice or the answer changes.
+/// Plot data, cached until the selection or the result changes.
 #[derive(Default)]
 struct Drawn {
     key: Option<(u64, Choice)>,
@@ -96,18 +97,18 @@ impl Over {
                 }
             }
         });
-        chosen.response.on_hover_text("What the residual is drawn over").accessible_name("residual over");
+        chosen.response.on_hover_text("Variable to plot the residual over").accessible_name("residual over");
         if goes_round(variable) {
-            let help = "The angle within a turn, so that what comes back with every turn shows";
+            let help = "Angle within one turn, to show periodic residuals";
             ui.checkbox(&mut self.choice.folded, "one turn").on_hover_text(help);
         }
         if explorer.held_out.iter().any(|held| *held) {
-            let help = "Only rows that took no part in the estimates";
+            let help = "Held-out rows only";
             ui.checkbox(&mut self.choice.held_out, "held-out rows").on_hover_text(help);
         }
         ui.scope(|ui| {
-            let error = "About the mean: twice its standard error, as if the rows were independent";
-            let quartiles = "From the first to the third quartile of the rows";
+            let error = "Mean ± 2 standard errors, assuming independent rows";
+            let quartiles = "Interquartile range of the rows";
             let choices = [(Band::Error, "± 2 s.e.", error), (Band::Quartiles, "quartiles", quartiles)];
             choice_ui(ui, &mut self.choice.band, &choices);
         });
@@ -172,7 +173,7 @@ impl Over {
         });
     }
 
-    /// How far the means wander, as text beside the picture.
+    /// Spread of the means, as text next to the plot.
     pub(super) fn summary_ui(&self, explorer: &Explorer, ui: &mut Ui) {
         let reach = |bins: &[Bin]| {
             let (low, high) = bins.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), bin| {
@@ -182,7 +183,7 @@ impl Over {
         };
         let [before, after] = self.drawn.bins.each_ref().map(|bins| reach(bins));
         let unit = explorer.unit;
-        hint_ui(ui, format!("means from peak to peak: {before} {unit} before, {after} {unit} after"));
+        hint_ui(ui, format!("peak-to-peak of the means: {before} {unit} before, {after} {unit} after"));
     }
 }
 

@@ -11,7 +11,7 @@ use egui::{
     Event, Key, Modifiers, PointerButton, Pos2, Vec2, ViewportCommand, ViewportEvent, ViewportId, vec2,
 };
 use egui_kittest::{Harness, kittest::Queryable};
-use flqr_core::model_file::Model;
+use flqr_core::model::Model;
 use flqr_gui::{App, Tab, WindowOptions};
 use serde_json::Value;
 

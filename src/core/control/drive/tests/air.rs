@@ -3,12 +3,13 @@
 use std::ops::ControlFlow;
 
 use super::rig::{Rig, controller, paper};
-use crate::control::ControllerKind;
-use crate::control::drive::{Drive, DriveSettings, Excitation, StopReason};
+use crate::control::{
+    ControllerKind,
+    drive::{Drive, DriveSettings, Excitation, StopReason},
+};
 use crate::identify::{FitOptions, fit};
-use crate::model_file::Model;
+use crate::model::{Model, Motor};
 use crate::record::{BenchSample, Log};
-use crate::robot::Motor;
 
 fn in_air(excitation: Excitation, scale: f64, seconds: f64) -> (Rig, Option<StopReason>) {
     let robot = paper();
@@ -58,7 +59,7 @@ fn a_multisine_records_bench_logs_from_which_the_inertia_is_fitted() {
     let robot = paper();
     let model = Model {
         name: "robot".to_owned(),
-        rig: crate::model_file::Rig::Robot(Box::new(robot.clone())),
+        rig: crate::model::Rig::Robot(Box::new(robot.clone())),
         tolerance: Default::default(),
     };
     for motor in Motor::BOTH {
@@ -80,7 +81,7 @@ fn a_wrong_torque_scale_stops_the_sweep() {
     }
 }
 
-/// The multisine stands on top of the balance: what is asked for differs from the controller's own torque by it.
+/// The multisine stands on top of the balance: what is requested differs from the controller's own torque by it.
 #[test]
 fn a_multisine_on_top_of_the_balance_moves_the_motors_apart() {
     let robot = paper();

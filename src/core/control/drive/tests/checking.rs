@@ -1,13 +1,12 @@
 //! What is checked before arming, and what is said where something is wrong.
 
 use super::rig::{Fault, Rig, controller, paper};
-use crate::control::ControllerKind;
-use crate::control::drive::{
-    CheckResult, Drive, DriveEvent, DriveOrder, DriveSettings, Excitation, Inputs, Stage,
+use crate::control::{
+    ControllerKind,
+    drive::{CheckResult, Drive, DriveEvent, DriveOrder, DriveSettings, Excitation, Inputs, Stage},
 };
 use crate::link::{MotorErrors, MotorEvent, MotorOrder};
-use crate::model_file::RobotModel;
-use crate::robot::Motor;
+use crate::model::{Motor, RobotModel};
 
 /// A robot that has been checked for 4.1 s.
 fn checked(edit: impl FnOnce(&mut Rig)) -> Rig {
@@ -58,14 +57,14 @@ fn each_defect_is_named_with_its_mend_and_keeps_the_robot_from_being_armed() {
             "id 2 is silent while id 1 answers",
             Box::new(fault(Fault::MotorVanishes(Motor::Right))),
         ),
-        ("left motor", Failed, "so is the other motor: look at supply", Box::new(fault(Fault::Deaf))),
+        ("left motor", Failed, "so is the other motor: check supply", Box::new(fault(Fault::Deaf))),
         (
             "temperature",
             Failed,
             "let the motors cool",
             Box::new(fault(Fault::Temperature(Motor::Left, 81.0))),
         ),
-        ("voltage", Failed, "19.0 V, not from 20 to 30 V", Box::new(fault(Fault::Voltage(19.0)))),
+        ("voltage", Failed, "19.0 V, outside 20 to 30 V", Box::new(fault(Fault::Voltage(19.0)))),
         (
             "motor errors",
             Failed,
@@ -73,10 +72,13 @@ fn each_defect_is_named_with_its_mend_and_keeps_the_robot_from_being_armed() {
             Box::new(fault(Fault::Errors(Motor::Right, MotorErrors(64)))),
         ),
         ("IMU rate", Failed, "the IMU is silent", Box::new(fault(Fault::ImuSilent))),
-        ("IMU moves", Failed, "very same reading", Box::new(|rig| rig.faults.push((3000, Fault::ImuFrozen)))),
-        ("directions", Failed, "turn pitch_direction in [link] over", Box::new(|rig| rig.signs[0] = -1.0)),
-        ("directions", Failed, "turn left_direction in [link] over", Box::new(|rig| rig.signs[1] = -1.0)),
-        ("directions", Failed, "turn right_direction in [link] over", Box::new(|rig| rig.signs[2] = -1.0)),
+        ("IMU moves", Failed, "same measurement", Box::new(|rig| rig.faults.push((3000, Fault::ImuFrozen)))),
+        // The body is upright again, so that pitch and integrated rate agree in the end.
+        ("IMU moves", Failed, "pitch rate", Box::new(fault(Fault::RateZero))),
+        ("IMU moves", Failed, "pitch", Box::new(fault(Fault::PitchFrozen))),
+        ("directions", Failed, "reverse pitch_direction in [link]", Box::new(|rig| rig.signs[0] = -1.0)),
+        ("directions", Failed, "reverse left_direction in [link]", Box::new(|rig| rig.signs[1] = -1.0)),
+        ("directions", Failed, "reverse right_direction in [link]", Box::new(|rig| rig.signs[2] = -1.0)),
         ("directions", Failed, "set encoder_steps in [link]", Box::new(|rig| rig.signs = [1.0, 0.25, 0.25])),
         ("directions", Waiting, "rock the body slowly", Box::new(|rig| rig.hand = |_| 0.0)),
         ("directions", Waiting, "wheels on the ground", Box::new(|rig| rig.signs = [1.0, 0.01, 0.01])),
@@ -107,9 +109,7 @@ fn an_imu_slower_than_set_is_named() {
     robot.link.imu_rate_hz = 200;
     let rig = checked_as(&robot, |_| {});
     let check = rig.drive.checks().iter().find(|check| check.name == "IMU rate").unwrap();
-    assert!(
-        check.result == CheckResult::Failed && check.text.contains("100 readings a second in place of 200")
-    );
+    assert!(check.result == CheckResult::Failed && check.text.contains("100 Hz instead of 200 Hz"));
 }
 
 #[test]

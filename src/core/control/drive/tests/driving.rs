@@ -1,11 +1,12 @@
 //! The balancing robot under a drive.
 
 use super::rig::{Rig, controller, in_hand, leans_forward, paper};
-use crate::control::drive::{Drive, DriveSettings, Excitation, StopReason};
-use crate::control::{ControllerKind, Measurement, Odometry, Reference};
-use crate::model_file::RobotModel;
-use crate::robot::{Payload, State};
-use crate::simulate::{Ground, SimulatedRobot, SimulationSettings};
+use crate::control::{
+    ControllerKind, Measurement, Odometry, Reference,
+    drive::{Drive, DriveSettings, Excitation, StopReason},
+};
+use crate::model::{Ground, Payload, RobotModel, State};
+use crate::simulate::{SimulatedRobot, SimulationSettings};
 
 const PLAIN: DriveSettings = DriveSettings { latency_compensation: false, torque_scale_check: false };
 

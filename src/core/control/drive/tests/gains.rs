@@ -3,18 +3,17 @@
 use nalgebra::{Complex, Matrix2x4};
 
 use super::rig::{Rig, controller, paper};
-use crate::control::drive::{
-    Drive, DriveError, DriveEvent, DriveOrder, DriveSettings, Excitation, Stage, StopReason,
+use crate::control::{
+    BalanceController, ControllerKind,
+    drive::{Drive, DriveError, DriveEvent, DriveOrder, DriveSettings, Excitation, Stage, StopReason},
+    gate::{self, Refusal, Verdict},
 };
-use crate::control::gate::{self, Refusal, Verdict};
-use crate::control::{BalanceController, ControllerKind};
-use crate::effects::{Effect, MachineKind};
 use crate::friction::{Compensation, Stribeck, StribeckParameters};
-use crate::lqr::{self, SampledLoop, Weights, sampled_poles, weights_for_pole};
-use crate::model_file::{Model, RobotModel, presets};
-use crate::robot::{RobotParameters, YawHold};
+use crate::lqr::{self, SampledLoop, sampled_poles, weights_for_pole};
+use crate::model::{Effect, MachineKind, Model, RobotModel, RobotParameters, Weights, YawHold};
+use crate::model_file::presets;
 
-/// The controller that a window makes of an edited model: none where there is no design.
+/// The controller that a window makes of an edited model: `None` if there is no design.
 fn designed(robot: &RobotModel) -> Option<BalanceController> {
     let gain = lqr::design(&robot.parameters.linear_model(), &robot.weights?).ok()?.gain;
     BalanceController::new(ControllerKind::Flqr, robot, gain).ok()
@@ -132,7 +131,9 @@ fn a_driven_robot_stands_through_every_bad_edit() {
             let events = rig.step(&[DriveOrder::Controller(Box::new(new))]).events.clone();
             match &events[..] {
                 [DriveEvent::Note("new gains applied")] => applied += 1,
-                [DriveEvent::Warning(text)] if text.contains("the previous ones stay") => refused += 1,
+                [DriveEvent::Warning(text)] if text.contains("the previous ones remain active") => {
+                    refused += 1
+                }
                 other => panic!("{name}: {other:?}"),
             }
             let mut largest_rad: f64 = 0.0;
@@ -213,8 +214,8 @@ fn a_stop_by_the_operator_and_new_gains_are_worded_as_such() {
     let events = rig.step(&[DriveOrder::Controller(Box::new(scaled(0.95).unwrap()))]).events.clone();
     assert_eq!(events.iter().map(ToString::to_string).collect::<Vec<_>>(), ["new gains applied"]);
     rig.step(&[DriveOrder::Stop]);
-    assert_eq!(rig.drive.stage(), Stage::Stopped(StopReason::Asked));
-    assert_eq!(StopReason::Asked.to_string(), "stop command from the operator");
+    assert_eq!(rig.drive.stage(), Stage::Stopped(StopReason::Requested));
+    assert_eq!(StopReason::Requested.to_string(), "stop command from the operator");
 }
 
 #[test]

@@ -5,8 +5,8 @@ use std::time::Duration;
 use super::rig::paper;
 use crate::control::drive::Listener;
 use crate::link::{ImuReading, MotorEvent, MotorState};
+use crate::model::Motor;
 use crate::record::Sample;
-use crate::robot::Motor;
 
 fn at(ms: u64) -> Duration {
     Duration::from_millis(ms)

@@ -1,11 +1,12 @@
 //! Robots with nothing wrong are not stopped, whatever they carry, stand on, or are pushed by.
 
 use super::rig::{Rig, controller};
-use crate::control::drive::{Drive, DriveOrder, DriveSettings, Excitation, StopReason};
-use crate::control::{ControllerKind, Reference};
-use crate::model_file::{RobotModel, presets};
-use crate::robot::{Payload, State};
-use crate::simulate::Ground;
+use crate::control::{
+    ControllerKind, Reference,
+    drive::{Drive, DriveOrder, DriveSettings, Excitation, StopReason},
+};
+use crate::model::{Ground, Payload, RobotModel, State};
+use crate::model_file::presets;
 
 /// What a robot meets while it is driven.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,7 +44,7 @@ const SECONDS: u64 = 8;
 /// The preset with the wiring of the paper's robot where it gives none.
 fn preset(index: usize, imu_rate_hz: f64) -> RobotModel {
     let (_, text) = presets::ALL[index];
-    let mut robot = crate::model_file::Model::from_toml(text, "preset").unwrap().robot().unwrap().clone();
+    let mut robot = crate::model::Model::from_toml(text, "preset").unwrap().robot().unwrap().clone();
     let constant = if robot.limits.torque_nm.unwrap() > 5.0 { 0.81 } else { 0.32 };
     robot.link.torque_constant_nm_a.get_or_insert(constant);
     (robot.sensors.imu_rate_hz, robot.link.imu_rate_hz) = (imu_rate_hz, imu_rate_hz as u32);

@@ -3,15 +3,15 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use crate::control::drive::{
-    Drive, DriveEvent, DriveOrder, DriveSettings, Excitation, Inputs, Output, Stage, StopReason,
+use crate::control::{
+    BalanceController, ControllerKind,
+    drive::{Drive, DriveEvent, DriveOrder, DriveSettings, Excitation, Inputs, Output, Stage, StopReason},
 };
-use crate::control::{BalanceController, ControllerKind};
 use crate::link::{ImuReading, MotorErrors, MotorEvent, MotorHealth, MotorOrder, MotorState};
 use crate::lqr;
-use crate::model_file::{RobotModel, presets};
-use crate::robot::{Motor, State, TICK_S};
-use crate::simulate::{Ground, SimulatedRobot, SimulationSettings};
+use crate::model::{Ground, Motor, RobotModel, State, TICK_S};
+use crate::model_file::presets;
+use crate::simulate::{SimulatedRobot, SimulationSettings};
 
 pub(super) fn paper() -> RobotModel {
     let mut robot = presets::paper().robot().unwrap().clone();
@@ -37,7 +37,7 @@ pub(super) enum Fault {
     NotFinite,
     BusDown,
     Late(f64),
-    /// Orders are not heard.
+    /// Orders are not received.
     Deaf,
     /// A motor tells neither voltage nor errors.
     HealthSilent(Motor),
@@ -69,7 +69,7 @@ pub(super) struct Rig {
     pub(super) tick: u64,
     /// Whether readings reach the drive a tick after they are taken, as over a bus; the model's delay has it.
     wire: bool,
-    /// Torque on the shaft over torque asked for.
+    /// Torque on the shaft over torque requested.
     pub(super) torque_scale: f64,
     /// Signs with which the IMU and both motors count.
     pub(super) signs: [f64; 3],
@@ -185,7 +185,7 @@ impl Rig {
         self.faults.iter().find(|(from, kind)| *from <= self.tick && fault(kind)).map(|(_, kind)| *kind)
     }
 
-    fn state(&self, motor: Motor, readings: &crate::control::Readings) -> MotorEvent {
+    fn state(&self, motor: Motor, readings: &crate::record::Readings) -> MotorEvent {
         let side = motor as usize;
         let sign = self.signs[1 + side];
         let temperature_c = match self.faulty(|f| matches!(f, Fault::Temperature(m, _) if *m == motor)) {
@@ -232,7 +232,7 @@ impl Rig {
         )
     }
 
-    fn imu(&mut self, readings: &crate::control::Readings) -> Option<ImuReading> {
+    fn imu(&mut self, readings: &crate::record::Readings) -> Option<ImuReading> {
         if !self.tick.is_multiple_of(self.imu_period) || self.faulty(|f| *f == Fault::ImuSilent).is_some() {
             return None;
         }
@@ -324,7 +324,7 @@ impl Rig {
     }
 
     /// What the motors do and answer.
-    fn hear(&mut self, order: MotorOrder, readings: &crate::control::Readings) {
+    fn hear(&mut self, order: MotorOrder, readings: &crate::record::Readings) {
         if self.faulty(|f| *f == Fault::Deaf).is_some() {
             return;
         }
@@ -338,8 +338,7 @@ impl Rig {
             let answer = match order {
                 MotorOrder::On | MotorOrder::Off => {
                     self.on[side] = order == MotorOrder::On;
-                    let command = if order == MotorOrder::On { 0x88 } else { 0x80 };
-                    MotorEvent::Acknowledged { motor, time, command }
+                    MotorEvent::Switched { motor, time, on: self.on[side] }
                 }
                 MotorOrder::Torque(asked) => {
                     self.torque_nm[side] = asked[side];

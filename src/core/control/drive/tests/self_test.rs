@@ -1,10 +1,11 @@
 //! What small torques after arming show of motors and robot.
 
 use super::rig::{Fault, Rig, controller, paper};
-use crate::control::ControllerKind;
-use crate::control::drive::{Drive, DriveSettings, Excitation, StopReason};
-use crate::model_file::RobotModel;
-use crate::robot::{Motor, Payload};
+use crate::control::{
+    ControllerKind,
+    drive::{Drive, DriveSettings, Excitation, StopReason},
+};
+use crate::model::{Motor, Payload, RobotModel};
 
 /// Name of the stop of a robot that is armed with these faults, and ticks since it was armed.
 fn stop_of(edit: impl FnOnce(&mut Rig), kind: ControllerKind, seed: u64) -> Option<(&'static str, u64)> {

@@ -3,12 +3,14 @@
 use std::time::Duration;
 
 use super::rig::{Fault, Rig, controller, paper};
-use crate::control::ControllerKind;
-use crate::control::drive::{
-    Drive, DriveError, DriveEvent, DriveOrder, DriveSettings, Excitation, Inputs, Stage, StopReason,
+use crate::control::{
+    ControllerKind,
+    drive::{
+        Drive, DriveError, DriveEvent, DriveOrder, DriveSettings, Excitation, Inputs, Stage, StopReason,
+    },
 };
 use crate::link::{MotorErrors, MotorOrder};
-use crate::robot::{Motor, SafetyLimits};
+use crate::model::{Motor, SafetyLimits};
 
 fn armed(seed: u64) -> (Rig, u64) {
     let mut rig = Rig::balancing(&paper(), ControllerKind::Flqr, DriveSettings::default(), seed);
@@ -27,7 +29,7 @@ fn orders_from(rig: &Rig, time: Duration) -> Vec<(Duration, Vec<MotorOrder>)> {
 fn each_watch_fires_within_its_time_and_a_tick() {
     let limits = SafetyLimits::default();
     let (imu, frozen, motor) = (limits.imu_timeout_s, limits.imu_frozen_s, limits.motor_timeout_s);
-    // The last reading before the fault is up to a period older than the fault; health is asked for every 30
+    // The last reading before the fault is up to a period older than the fault; health is requested every 30
     // and 60 ms in turn, and its answer is a tick under way.
     for (fault, name, least_s, most_s) in [
         (Fault::MotorVanishes(Motor::Left), "motor_silent", motor - 0.002, motor + 0.001),
@@ -114,7 +116,7 @@ fn a_stop_is_repeated_until_it_is_acknowledged_and_nothing_follows() {
     let stop = rig.tick;
     rig.faults.push((stop, Fault::Deaf));
     rig.step(&[DriveOrder::Stop]);
-    assert_eq!(rig.drive.stage(), Stage::Stopped(StopReason::Asked));
+    assert_eq!(rig.drive.stage(), Stage::Stopped(StopReason::Requested));
     for _ in 0..99 {
         rig.step(&[]);
     }
@@ -125,15 +127,17 @@ fn a_stop_is_repeated_until_it_is_acknowledged_and_nothing_follows() {
     let off = vec![MotorOrder::Torque([0.0; 2]), MotorOrder::Off];
     for (time, orders) in orders_from(&rig, Duration::from_millis(stop)) {
         let after = time.as_millis() as u64 - stop;
-        // Every 5 ms while the motors are deaf; the one at 100 ms is heard and acknowledged.
+        // Every 5 ms while the motors are deaf; the one at 100 ms is received and acknowledged.
         let expected = if after <= 100 && after.is_multiple_of(5) { off.clone() } else { vec![] };
         assert_eq!(orders, expected, "{after} ms after the stop");
     }
     assert_eq!(rig.on, [false; 2]);
-    assert!(rig.events().any(|(_, event)| *event == DriveEvent::Stage(Stage::Stopped(StopReason::Asked))));
+    assert!(
+        rig.events().any(|(_, event)| *event == DriveEvent::Stage(Stage::Stopped(StopReason::Requested)))
+    );
     rig.step(&[DriveOrder::Arm]);
     rig.step(&[DriveOrder::Check]);
-    assert_eq!(rig.drive.stage(), Stage::Stopped(StopReason::Asked));
+    assert_eq!(rig.drive.stage(), Stage::Stopped(StopReason::Requested));
     rig.step(&[DriveOrder::Release]);
     assert_eq!(rig.drive.stage(), Stage::Listening);
     assert!(rig.outputs.iter().rev().take(4).all(|(_, output)| output.orders.is_empty()));
@@ -155,7 +159,7 @@ fn motors_that_were_not_switched_on_here_are_not_switched_off() {
             rig.step(&[DriveOrder::Check]);
         }
         assert_eq!(rig.step(&[DriveOrder::Stop]).orders[..], []);
-        assert_eq!(rig.drive.stage(), Stage::Stopped(StopReason::Asked));
+        assert_eq!(rig.drive.stage(), Stage::Stopped(StopReason::Requested));
         assert!(rig.drive.has_ended());
         (0..100).for_each(|_| drop(rig.step(&[]).clone()));
         let sent = rig.outputs.iter().flat_map(|(_, output)| output.orders.iter());
@@ -227,7 +231,7 @@ fn torques_stay_within_limit_and_slew() {
 
 #[test]
 fn what_cannot_be_driven_is_refused_with_its_mend() {
-    let refused = |edit: fn(&mut crate::model_file::RobotModel), excitation| {
+    let refused = |edit: fn(&mut crate::model::RobotModel), excitation| {
         let mut robot = paper();
         let control = controller(&robot, ControllerKind::Lqr);
         edit(&mut robot);
@@ -245,7 +249,7 @@ fn what_cannot_be_driven_is_refused_with_its_mend() {
     assert!(matches!(found, DriveError::Parameter(_)), "{found}");
 }
 
-/// Whatever comes in, a drive that was never asked for anything says nothing.
+/// Whatever comes in, a drive that was never queried says nothing.
 #[test]
 fn listening_gives_no_order() {
     let (rig, _) = armed(7);
@@ -273,7 +277,7 @@ fn listening_gives_no_order() {
 #[test]
 fn motors_roll_out_before_they_are_switched_off_where_that_is_chosen() {
     let mut robot = paper();
-    robot.safety.stop = crate::robot::StopAction::ZeroThenOff;
+    robot.safety.stop = crate::model::StopAction::ZeroThenOff;
     for (push_n, vanishes, least_ms, most_ms) in
         [(0.0, false, 0, 0), (60.0, false, 50, 1000), (60.0, true, 20, 25)]
     {
@@ -320,7 +324,7 @@ fn the_missing_time_out_of_the_motors_is_said_before_arming() {
     let mut rig = Rig::balancing(&paper(), ControllerKind::Lqr, DriveSettings::default(), 1);
     let checking = rig.step(&[DriveOrder::Check]);
     let said = checking.events.iter().any(|event| {
-        matches!(event, DriveEvent::Warning(text) if text.contains("time-out") && text.contains("keep their last torque"))
+        matches!(event, DriveEvent::Warning(text) if text.contains("timeout") && text.contains("hold their last torque"))
     });
     assert!(said, "{:?}", checking.events);
 }

@@ -1,9 +1,11 @@
 //! Sensors that lie while the robot balances: the robot is stopped before it has gone far.
 
 use super::rig::{Fault, Rig, controller, paper};
-use crate::control::drive::{Drive, DriveOrder, DriveSettings, Excitation, Stage, StopReason};
-use crate::control::{ControllerKind, Reference};
-use crate::robot::Motor;
+use crate::control::{
+    ControllerKind, Reference,
+    drive::{Drive, DriveOrder, DriveSettings, Excitation, Stage, StopReason},
+};
+use crate::model::Motor;
 
 /// What the robot did from the fault to the stop, truly: name of the stop, displacement, m, greatest pitch and
 /// heading, rad.

@@ -1,6 +1,6 @@
 //! Shape parameters of what was picked: orders, delays, time constants.
 
-use crate::effects::MachineKind;
+use crate::model::MachineKind;
 
 use super::super::candidates::Candidate;
 use super::{Fit, Search};

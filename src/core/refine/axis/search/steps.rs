@@ -1,11 +1,14 @@
 //! Forward selection of effects: singles, pairs, and checks backward and on held-out rows.
 
 use crate::effects::{EffectKind, PREFERRED};
-use crate::identify::quantile::student_t_975;
-use crate::refine::error::RefineError;
-use crate::refine::gain::Gain;
-use crate::refine::select::{Blocks, Judged, Member};
-use crate::refine::{Watch, report};
+use crate::refine::{
+    Watch,
+    error::RefineError,
+    gain::Gain,
+    report,
+    select::{Blocks, Judged, Member},
+};
+use crate::signal::quantile::student_t_975;
 
 use super::super::candidates::Candidate;
 use super::super::nuisance::Nuisance;
@@ -65,7 +68,7 @@ pub(in super::super) struct Alone {
 
 /// Candidates added to the picks, and how they do.
 #[derive(Clone)]
-struct Tried {
+struct ScoredCandidate {
     chosen: Vec<usize>,
     judged: Judged,
     /// Of the added one that is least sure.
@@ -98,7 +101,7 @@ impl Search<'_> {
         let waves =
             waves::strongest(self.machine, self.rows, &self.scales, self.whitener, &residual, &self.picks);
         // One way, friction that depends on the angle and a torque that does so are the same.
-        let waves = waves.into_iter().filter(|(kind, _)| self.rows.both_ways() || !kind.waves_oppose());
+        let waves = waves.into_iter().filter(|(kind, _)| self.rows.both_ways() || !kind.harmonics_oppose());
         Some(waves.map(|(kind, shape)| self.candidate(kind, shape)).collect())
     }
 
@@ -147,7 +150,7 @@ impl Search<'_> {
     }
 
     /// The picks with some candidates more.
-    fn try_with(&self, round: &Round<'_>, chosen: &[usize]) -> Option<Tried> {
+    fn try_with(&self, round: &Round<'_>, chosen: &[usize]) -> Option<ScoredCandidate> {
         let added: Vec<_> = chosen.iter().map(|&index| round.more[index]).collect();
         let all = [round.picks, &added].concat();
         let members = self.members(&all, true);
@@ -166,26 +169,26 @@ impl Search<'_> {
             });
             z = z.min(judged.z(range, &lengths));
         }
-        Some(Tried { chosen: chosen.to_vec(), judged, z, at_bound })
+        Some(ScoredCandidate { chosen: chosen.to_vec(), judged, z, at_bound })
     }
 
-    fn passes(&self, tried: &Tried, base: &Judged, gains: f64) -> bool {
+    fn passes(&self, tried: &ScoredCandidate, base: &Judged, gains: f64) -> bool {
         !tried.at_bound
             && tried.z >= self.thresholds.z
             && tried.judged.gain_over(base) > gains * self.thresholds.gain
     }
 
     /// Of those that are as good as the best, the one that the library prefers.
-    fn best_single(&self, round: &Round<'_>, base: &Judged, short: &[usize]) -> Option<Tried> {
-        let singles: Vec<Tried> = short
+    fn best_single(&self, round: &Round<'_>, base: &Judged, short: &[usize]) -> Option<ScoredCandidate> {
+        let singles: Vec<ScoredCandidate> = short
             .iter()
             .take(SHORT_LIST)
             .filter_map(|&index| self.try_with(round, &[index]))
             .filter(|tried| self.passes(tried, base, 1.0))
             .collect();
-        let gain = |tried: &Tried| tried.judged.gain_over(base);
+        let gain = |tried: &ScoredCandidate| tried.judged.gain_over(base);
         let most = singles.iter().map(gain).fold(0.0, f64::max);
-        let rank = |tried: &Tried| {
+        let rank = |tried: &ScoredCandidate| {
             let kind = round.more[tried.chosen[0]].0.kind;
             PREFERRED.iter().position(|own| *own == kind).unwrap_or(PREFERRED.len())
         };
@@ -196,7 +199,7 @@ impl Search<'_> {
     }
 
     /// Two that pass together where none does alone.
-    fn best_pair(&self, round: &Round<'_>, base: &Judged, short: &[usize]) -> Option<Tried> {
+    fn best_pair(&self, round: &Round<'_>, base: &Judged, short: &[usize]) -> Option<ScoredCandidate> {
         let list = &short[..short.len().min(PAIRED)];
         let kind = |index: usize| round.more[index].0.kind;
         let pairs = list.iter().enumerate().flat_map(|(n, &a)| {

@@ -1,6 +1,7 @@
 //! Shapes of candidates, refined.
 
-use crate::effects::{Grid, MachineKind, Parameter, Step};
+use crate::effects::{Grid, Parameter, Step};
+use crate::model::MachineKind;
 use crate::refine::select::Member;
 
 use super::screen::Screen;

@@ -1,8 +1,8 @@
 use super::*;
 use crate::friction::{Stribeck, StribeckParameters};
-use crate::robot::{RobotParameters, State};
+use crate::model::{RobotParameters, State};
 
-/// Robots that differ in everything: every fifth without any friction, every seventh without a level at rest.
+/// Robots that differ in everything: every fifth without any friction, every seventh without a level at standstill.
 fn robots(count: usize) -> Vec<PlanarPlant> {
     let robot = |index: usize| {
         let part = |period: usize| (index % period) as f64 / period as f64;

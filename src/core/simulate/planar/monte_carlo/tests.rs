@@ -1,10 +1,9 @@
 use super::*;
 use crate::control::ControllerKind;
-use crate::effects::{Effect, MachineKind};
 use crate::friction::{Stribeck, StribeckParameters};
 use crate::lqr;
+use crate::model::{Actuation, Effect, MachineKind, MotorLimits, SensorSettings};
 use crate::model_file::presets;
-use crate::robot::{Actuation, MotorLimits, SensorSettings};
 use crate::simulate::{Simulation, SimulationSettings};
 
 const ONE_THREAD: NonZeroUsize = NonZeroUsize::MIN;

@@ -2,7 +2,7 @@ use nalgebra::{Matrix2, Vector2};
 
 use super::*;
 use crate::friction::StribeckParameters;
-use crate::robot::Coefficients;
+use crate::model::Coefficients;
 
 const ROBOT: RobotParameters = RobotParameters {
     body_mass_kg: 12.6,
@@ -212,7 +212,7 @@ fn a_time_stepping_scheme_agrees_through_stops_and_starts() {
             let inverse = mass.try_inverse().unwrap();
             let free = speed + inverse * force * dt;
             let curves = || friction.iter().flatten();
-            let level: f64 = curves().map(|curve| curve.level_nm(speed[0])).sum();
+            let level: f64 = curves().map(|curve| curve.amplitude_nm(speed[0])).sum();
             let offset: f64 =
                 curves().map(|c| c.torque_nm(0.0) + c.parameters().viscous_nm_s_rad * speed[0]).sum();
             let stopping = free[0] / (inverse[(0, 0)] * dt);

@@ -7,7 +7,7 @@ mod sticking;
 
 use super::*;
 use crate::friction::{Stribeck, StribeckParameters};
-use crate::robot::{Payload, RobotParameters, Surroundings, Tether};
+use crate::model::{Payload, RobotParameters, Surroundings, Tether};
 use crate::simulate::PlanarPlant;
 
 const ROBOT: RobotParameters = RobotParameters {

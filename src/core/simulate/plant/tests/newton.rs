@@ -23,7 +23,7 @@ struct Moving {
 /// moments about the axle, moments about the normal. Linear in accelerations and torques.
 fn residual(at: &Moving, accel: &Vector3<f64>, shaft_nm: [f64; 2], push: (f64, f64)) -> Vector3<f64> {
     let (r, l, gravity) = (ROBOT.wheel_radius_m, ROBOT.com_height_m, ROBOT.gravity_m_s2);
-    let chassis = crate::robot::Chassis::default();
+    let chassis = crate::model::Chassis::default();
     let half = 0.5 * chassis.track_width_m;
     let up = Vector3::z();
     let (sin, cos) = at.yaw.sin_cos();
@@ -32,7 +32,7 @@ fn residual(at: &Moving, accel: &Vector3<f64>, shaft_nm: [f64; 2], push: (f64, f
     let off_path = up * at.tilt.cos() - ahead * at.tilt.sin();
     let weight = Vector3::new(-at.slope.sin(), 0.0, -at.slope.cos()) * gravity;
 
-    // The body: a frame of its own axes, its turning and the way of its centre of mass.
+    // The body: a separate frame axes, its turning and the way of its centre of mass.
     let (fore, axis) =
         (ahead * at.lean.cos() - up * at.lean.sin(), ahead * at.lean.sin() + up * at.lean.cos());
     let spin = up * at.yaw_rate + left * at.lean_rate;
@@ -74,7 +74,7 @@ fn solved(at: &Moving, push: (f64, f64)) -> [Vector3<f64>; 3] {
 
 /// Speeds or accelerations of forward, yaw and lean as those of the motors.
 fn of_motors(of: &Vector3<f64>) -> [f64; 2] {
-    let half = 0.5 * crate::robot::Chassis::default().track_width_m;
+    let half = 0.5 * crate::model::Chassis::default().track_width_m;
     [-1.0, 1.0].map(|side| (of[0] + side * half * of[1]) / ROBOT.wheel_radius_m - of[2])
 }
 
@@ -181,7 +181,7 @@ fn a_time_stepping_scheme_agrees_through_stops_and_starts_of_each_wheel() {
             let boxes = [0, 1].map(|i: usize| {
                 let p = friction[i].parameters();
                 let middle = p.offset_nm + p.viscous_nm_s_rad * motors[i];
-                (middle, friction[i].level_nm(motors[i]))
+                (middle, friction[i].amplitude_nm(motors[i]))
             });
             let mut brake = [0.0; 2];
             for _ in 0..60 {

@@ -55,7 +55,7 @@ const SHAFTS: [Shaft; 4] = [
     Shaft { inertia: 0.0065, curve: Curve { coulomb: 0.05, standing: 0.05, viscous: 0.001, ..MOTORS[1] } },
 ];
 
-/// One log of a motor to judge.
+/// One log of a motor to assess.
 pub(crate) struct BenchCase {
     pub(crate) name: String,
     pub(crate) seed: u64,
@@ -106,10 +106,10 @@ impl Flaw {
             Self::ViscousAsymmetry { nm_s } => ("viscous_nm_s_rad", nm_s),
             Self::FrictionAsymmetry { nm } | Self::Coulomb { nm } => ("coulomb_nm", nm),
             Self::Viscous { nm_s } => ("viscous_nm_s_rad", nm_s),
-            Self::LowSpeed { nm, .. } => ("level_nm", nm),
+            Self::LowSpeed { nm, .. } => ("amplitude_nm", nm),
             Self::LoadFriction { share } => ("coefficient", share),
             Self::Thermal { nm, .. } => ("fall_nm", nm),
-            Self::Presliding { nm, .. } => ("level_nm", nm),
+            Self::Presliding { nm, .. } => ("amplitude_nm", nm),
             Self::Delay { seconds } => ("delay_s", seconds),
             Self::Lag { seconds } => ("time_constant_s", seconds),
             Self::Gain { share } => ("gain", share),

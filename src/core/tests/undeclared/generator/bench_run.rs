@@ -154,7 +154,7 @@ impl Plant<'_> {
         }
     }
 
-    /// What reaches the wheel of a torque that is asked for, for one tick.
+    /// What reaches the wheel of a torque that is requested, for one tick.
     fn acting(&mut self, asked: f64, random: &mut Random) -> f64 {
         let mut torque = asked;
         let inertia = self.shaft.inertia;
@@ -211,7 +211,7 @@ impl Plant<'_> {
     }
 }
 
-/// The speed that the loop is asked for, rad/s, at every tick, and torque on top of it: slow both ways, steps or waves.
+/// The speed that the loop is requested, rad/s, at every tick, and torque on top of it: slow both ways, steps or waves.
 fn reference(style: u64, ticks: usize, random: &mut Random) -> Vec<[f64; 2]> {
     let seconds = ticks as f64 * TICK;
     let (height, period) = (random.between(4.5, 6.0), random.between(0.2, 0.35) * seconds);

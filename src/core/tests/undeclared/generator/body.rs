@@ -42,7 +42,7 @@ pub(crate) struct Body {
     pub(crate) cost: ([f64; 4], f64),
 }
 
-/// Shares of themselves by which the numbers of a robot may be off.
+/// Fractions of themselves by which the numbers of a robot may be off.
 pub(crate) struct Tolerances {
     pub(crate) masses: f64,
     pub(crate) lengths: f64,

@@ -6,7 +6,7 @@ use super::body::{BODIES, Body};
 use super::fault::Fault;
 use super::random::Random;
 
-/// One log to judge.
+/// One log to assess.
 pub(crate) struct Case {
     pub(crate) name: String,
     pub(crate) seed: u64,
@@ -97,7 +97,7 @@ pub(crate) fn outside(kind: usize, random: &mut Random) -> Fault {
 /// Kinds of [`outside`].
 pub(crate) const OUTSIDE: usize = 13;
 
-/// A robot and its declaration, off by up to a share of its tolerances.
+/// A robot and its declaration, off by up to a fraction of its tolerances.
 fn start(seed: u64, share: f64) -> (Random, Body, Body) {
     let mut random = Random::new(seed.wrapping_mul(7919).wrapping_add(17));
     let declared = BODIES[(seed % 4) as usize];
@@ -109,7 +109,7 @@ fn case(name: String, seed: u64, declared: Body, body: Body, faults: Vec<Fault>)
     Case { name, seed, declared, body, faults }
 }
 
-/// A robot as declared, within a share of its tolerances.
+/// A robot as declared, within a fraction of its tolerances.
 pub(crate) fn clean(seed: u64, share: f64) -> Case {
     let (_, declared, body) = start(seed, share);
     case("clean".into(), seed, declared, body, Vec::new())

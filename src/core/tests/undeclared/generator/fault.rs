@@ -135,7 +135,7 @@ impl Fault {
             ImuDelay { seconds } => ("delay_s", seconds),
             WheelInertia { kg_m2 } => ("inertia_kg_m2", kg_m2),
             Slip { m_s_n, .. } => ("slip_m_s_n", m_s_n),
-            LowSpeed { nm, .. } => ("level_nm", nm),
+            LowSpeed { nm, .. } => ("amplitude_nm", nm),
             Saturation { nm } => ("limit_nm", nm),
             Slosh { kg, .. } => ("mass_kg", kg),
             Push { n, .. } => ("force_n", n),

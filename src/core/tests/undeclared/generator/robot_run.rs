@@ -62,7 +62,7 @@ impl Plant<'_> {
         s[1] / self.whole.radius - s[3]
     }
 
-    /// Torque on both shafts without dry friction's direction when at rest, force and body torque.
+    /// Torque on both shafts without dry friction's direction when at standstill, force and body torque.
     fn loads(&self, s: &State, direction: f64) -> (f64, f64, f64) {
         let w = self.speed(s);
         let (mut shaft, mut axle, mut body) = (self.loads[0], self.loads[1], self.loads[2]);
@@ -205,7 +205,7 @@ impl Plant<'_> {
                 return;
             }
         }
-        // Chatter at the edge of sticking: the rest of the step is spent at rest.
+        // Chatter at the edge of sticking: the rest of the step is spent at standstill.
         self.stuck = true;
         *s = self.runge_kutta(s, h);
     }
@@ -289,7 +289,7 @@ fn through_actuator(faults: &[Fault], memory: &mut [[Memory; 2]], motor: usize, 
                 (1.0 - part) * back(whole) + part * back(whole + 1.0)
             }
             Fault::Lag { seconds } => {
-                // What is asked for holds for a tick, over which the mean acts.
+                // What is requested holds for a tick, over which the mean acts.
                 let (before, faded) = (memory.lagged - acts, (-TICK / seconds).exp());
                 memory.lagged = acts + before * faded;
                 acts + before * (1.0 - faded) * seconds / TICK
