@@ -49,6 +49,11 @@ open_window --tab tune
 zoomed
 until_state 90 "ten seconds are simulated" '.simulation.seconds >= 12'
 both tune
+xdotool key F1
+until_state 20 "the manual is open" '.manual.page == "design.md"'
+both manual
+xdotool key Escape
+until_state 20 "the manual is closed" '.manual == null'
 
 xdotool key ctrl+2
 until_state 20 "the friction page is there" '.tab == "friction"'

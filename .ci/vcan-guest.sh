@@ -45,21 +45,36 @@ grep ' 142#9A' reply.log | grep -qv '#9A00000000000000$' || fail "motor 2 answer
 kill $emulator
 wait $emulator || true
 
-step "driven for 60 s over CAN"
+step "driven for 60 s over CAN, recorded as candump hears it"
 # Replies have identifiers of their own here, so that the frames of each identifier have one sender and one order.
 flqr emulate $model --can vcan0 --imu --reply-id 0x180 --json --seconds 90 > emulate.json &
 emulator=$!
 sleep 1
 imu=$(head -n 1 emulate.json | jq -r .imu)
+candump -L -r 8388608 vcan0 > dump.log &
+dump=$!
+sleep 1
 flqr drive can:vcan0 $model --imu "serial:$imu@115200" --arm --yes --seconds 60 --record driven.csv --json > drive.jsonl ||
     { tail -n 3 drive.jsonl; fail "the robot was driven for 60 s"; }
+sleep 1
+kill $dump
+wait $dump || true
 last drive.jsonl
 tail -n 1 drive.jsonl
 tail -n 1 drive.jsonl | jq -e '.type == "end" and .stopped_by == "time_over" and .motors_off and .problem == null and
     .recording.rows > 60000 and .recording.rows_lost == 0' >/dev/null || fail "the run ended as it should"
 last drive.jsonl | jq -e '.bus.dropped == 0 and .bus.lost == 0 and .bus.late < 60 and .bus.load > 0.3' >/dev/null ||
     fail "no frame was lost, and fewer than one tick of a thousand came late"
-grep -q ' 141#8000000000000000' driven.log || fail "the motors were switched off in the end"
+# frames FILE: the frames of each identifier in their order, one identifier after the other, without times and directions
+frames() { grep -F " vcan0 " "$1" | cut -d " " -f 3 | sort -s -k 1.1,1.3; }
+frames dump.log > heard.txt
+frames driven.log > recorded.txt
+wc -l heard.txt recorded.txt
+cmp heard.txt recorded.txt || fail "the recording has the frames that candump heard"
+[ "$(wc -l < recorded.txt)" -gt 240000 ] || fail "four frames in each of 60,000 ticks"
+cut -c 2-18 driven.log | sort -n -c || fail "times of the recording rise"
+tail -n 20 driven.log | grep ' 14[12]#' | tail -n 2 | grep -q ' 142#8000000000000000 T' ||
+    fail "the motors were switched off in the end"
 kill $emulator
 wait $emulator || true
 
