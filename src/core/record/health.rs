@@ -63,6 +63,13 @@ impl std::fmt::Display for HealthFinding {
 const POSITIONS: [&str; 5] =
     ["motor_angle_rad", "motor_angle_left_rad", "motor_angle_right_rad", "position_m", "x_m"];
 
+/// Rows of a column that are far off the rows around them, each alone.
+pub(crate) fn single_outliers(time: &[f64], values: &[f64]) -> Vec<usize> {
+    let Some(row_s) = super::row_time_s(time) else { return Vec::new() };
+    let rows = spikes::spikes(time, values, row_s).into_iter().map(|(row, _)| row);
+    rows.filter(|&row| row > 0 && row + 1 < values.len()).collect()
+}
+
 /// The findings so far.
 #[derive(Default)]
 struct Findings(Vec<HealthFinding>);

@@ -36,6 +36,7 @@ mod write;
 
 pub use align::{Alignment, Signal, best_alignment, first_crossing_s};
 pub use error::{LineProblem, LogError};
+pub(crate) use health::single_outliers;
 pub use health::{HealthFinding, Severity, data_health};
 pub use map::{ColumnMap, MapError, Mapping};
 pub use read::{ReadOptions, ReadProgress, read_log};

@@ -17,11 +17,14 @@
 //!    better than the library does has no name: `unexplained_residual`.
 
 mod axis;
+mod cleaning;
 mod closed_loop;
+mod corrected;
 mod demo;
 mod error;
 mod explorer;
 mod gain;
+mod gate;
 mod largest;
 mod left_out;
 mod next_experiment;
@@ -72,6 +75,9 @@ pub struct Options {
 /// Fraction of the work that the search is; the rest is the closed loop, predictions and the next experiment.
 const SEARCH: f64 = 0.75;
 
+/// Most effects that are left out of a search because predictions are worse with them.
+const MOST_BANNED: usize = 3;
+
 /// Told the fraction of the work that is done; may end it.
 type Watch<'a> = &'a mut dyn FnMut(f64) -> ControlFlow<()>;
 
@@ -96,10 +102,14 @@ pub fn residual(
 ) -> Result<Residual, RefineError> {
     let kind = kind_of(model, logs)?;
     check_speeds(options, kind)?;
+    let (mut logs, mut of_cells) = cleaning::repaired(logs);
+    of_cells.extend(cleaning::without_duplicates(&mut logs));
+    let logs = logs.as_slice();
     let mut found = match kind {
         LogKind::Robot => robot::residual(model, logs, options, watch),
         _ => axis::residual(model, logs, options, watch),
     }?;
+    found.data_health.extend(of_cells);
     if !found.errors.rmse.0.is_empty() {
         report(watch, 1.0)?;
         found.errors.prediction = predictions(model, logs, Rows::All, options.motor, options.seed);
@@ -128,22 +138,46 @@ pub fn refine(
         kind_of(model, held_out)?;
         return Err(mixed(logs, kind, other));
     }
-    let searching = &mut |share: f64| watch(SEARCH * share);
-    let mut found = match kind {
-        LogKind::Robot => robot::refine(model, logs, held_out, options, searching),
-        _ => axis::refine(model, logs, held_out, options, searching),
-    }?;
-    if found.verdict != Verdict::DataUnfit {
-        let kinds: Vec<_> = found.effects.iter().map(|effect| effect.effect.kind()).collect();
-        let trying = &mut |share: f64| watch(SEARCH + 0.1 * share);
-        found.closed_loop = closed_loop::closed_loop(model, &mut found.model, &kinds, options.seed, trying)?;
-        report(watch, SEARCH + 0.1)?;
-        let (told, rows) = if held_out.is_empty() { (logs, Rows::LastThird) } else { (held_out, Rows::All) };
-        let predicted = |model: &Model| predictions(model, told, rows, options.motor, options.seed);
+    let (mut logs, mut of_cells) = cleaning::repaired(logs);
+    let (mut held_out, of_held_out) = cleaning::repaired(held_out);
+    of_cells.extend(of_held_out);
+    of_cells.extend(cleaning::without_duplicates(&mut logs));
+    of_cells.extend(cleaning::without_duplicates(&mut held_out));
+    let (logs, held_out) = (logs.as_slice(), held_out.as_slice());
+    let (told, rows) = if held_out.is_empty() { (logs, Rows::LastThird) } else { (held_out, Rows::All) };
+    let predicted = |model: &Model| predictions(model, told, rows, options.motor, options.seed);
+    let of_motor = (kind != LogKind::Robot).then_some(options.motor);
+    let mut banned = Vec::new();
+    let mut found = loop {
+        let searching = &mut |share: f64| watch(SEARCH * share);
+        let mut found = match kind {
+            LogKind::Robot => robot::refine(model, logs, held_out, (options, &banned), searching),
+            _ => axis::refine(model, logs, held_out, (options, &banned), searching),
+        }?;
+        if found.verdict == Verdict::DataUnfit {
+            break found;
+        }
+        if let Some(implausible) = gate::implausible(&found, |effect| declared_number(model, kind, effect)) {
+            found.data_health.insert(0, implausible);
+            break Refinement::unfit(model, found.data_health);
+        }
+        report(watch, SEARCH + 0.05)?;
         found.before.prediction = predicted(model);
-        report(watch, SEARCH + 0.15)?;
         found.after.prediction =
             if found.model == *model { found.before.prediction.clone() } else { predicted(&found.model) };
+        // Where numbers are free, predictions of the declared model are no measure for the effects.
+        let numbers_hold = options.estimate.is_empty();
+        let culprit = || numbers_hold.then(|| gate::culprit(&found, of_motor, predicted)).flatten();
+        match gate::unsure(&found).or_else(culprit) {
+            Some(kind) if banned.len() < MOST_BANNED => banned.push(kind),
+            _ => break found,
+        }
+    };
+    found.data_health.extend(of_cells);
+    if found.verdict != Verdict::DataUnfit {
+        let kinds: Vec<_> = found.effects.iter().map(|effect| effect.effect.kind()).collect();
+        let trying = &mut |share: f64| watch(SEARCH + 0.1 + 0.1 * share);
+        found.closed_loop = closed_loop::closed_loop(model, &mut found.model, &kinds, options.seed, trying)?;
         report(watch, SEARCH + 0.2)?;
         let context = Context { logs, motor: options.motor, seed: options.seed, file: &options.model_file };
         found.next_experiment = next_experiment::next_experiment(&found, &context);
@@ -156,6 +190,25 @@ pub fn refine(
     }
     found.document = pages::document(&found, logs, held_out);
     Ok(found)
+}
+
+/// The declared number that an effect is an error of.
+fn declared_number(model: &Model, kind: LogKind, effect: &Found) -> Option<f64> {
+    let id = effect.effect.id();
+    match (&model.rig, kind) {
+        (Rig::Robot(robot), LogKind::Robot) => match id {
+            "mass_error" => Some(robot.parameters.body_mass_kg),
+            "com_height_error" => Some(robot.parameters.com_height_m),
+            "body_inertia_error" => Some(robot.parameters.body_inertia_kg_m2),
+            _ => None,
+        },
+        _ if id != "inertia_error" => None,
+        (Rig::Robot(robot), _) => Some(robot.parameters.wheel_inertia_kg_m2),
+        (Rig::Axis(axis), _) => Some(match axis.parameters {
+            AxisParameters::Rotary { inertia_kg_m2, .. } => inertia_kg_m2,
+            AxisParameters::Linear { mass_kg, .. } => mass_kg,
+        }),
+    }
 }
 
 fn check_speeds(options: &Options, kind: LogKind) -> Result<(), RefineError> {

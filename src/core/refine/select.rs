@@ -59,6 +59,24 @@ pub struct Judged {
     pub covariance: DMatrix<f64>,
 }
 
+/// Estimates without bounds, and how sure they are.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Spread {
+    /// Coefficients of the members in their order.
+    pub estimates: Vec<f64>,
+    /// Their covariance.
+    pub covariance: DMatrix<f64>,
+    /// Standard errors by the rows alone, with nothing known beforehand.
+    pub alone: Vec<f64>,
+}
+
+impl Spread {
+    /// Standard error of a coefficient.
+    pub fn standard_error(&self, member: usize) -> f64 {
+        self.covariance[(member, member)].max(0.0).sqrt()
+    }
+}
+
 impl Judged {
     /// Sum of squares over all left-out blocks.
     pub fn error(&self) -> f64 {
@@ -98,6 +116,19 @@ impl Judged {
     pub fn standard_error(&self, member: usize) -> f64 {
         self.covariance[(member, member)].max(0.0).sqrt()
     }
+}
+
+/// Numbers of the blocks of rows, which lie log by log: no block spans two logs, and each log has as many as its length
+/// asks for.
+pub fn blocks_of(log_rows: &[usize], blocks: usize) -> Vec<usize> {
+    let total: usize = log_rows.iter().sum();
+    let (mut found, mut next) = (Vec::with_capacity(total), 0);
+    for &rows in log_rows.iter().filter(|rows| **rows > 0) {
+        let own = ((blocks * rows) as f64 / total as f64).round().max(1.0) as usize;
+        found.extend((0..rows).map(|row| next + row * own / rows));
+        next += own;
+    }
+    found
 }
 
 impl Blocks {
@@ -169,6 +200,71 @@ impl Blocks {
         let own: Vec<Member> =
             members.iter().enumerate().map(|(column, member)| Member { column, ..*member }).collect();
         small.judge_all(&own, noise)
+    }
+
+    /// Estimates without bounds and how sure they are; nothing where the members depend on each other.
+    ///
+    /// The covariance is that of the jackknife over blocks, so that it holds under coloured noise, with what the
+    /// declared tolerances leave open: an interval does not collapse where a bound would have held the number.
+    pub fn spread(&self, members: &[Member], noise: f64) -> Option<Spread> {
+        // What has one possible value is no estimate.
+        let (fixed, open): (Vec<usize>, Vec<usize>) =
+            (0..members.len()).partition(|&i| members[i].bounds[0] == members[i].bounds[1]);
+        let active: Vec<Member> = open.iter().map(|&i| members[i]).collect();
+        let size = active.len();
+        let right = |gram: &DMatrix<f64>| {
+            let held = |column: usize| -> f64 {
+                fixed.iter().map(|&i| members[i].bounds[0] * gram[(members[i].column, column)]).sum()
+            };
+            let products =
+                active.iter().map(|member| gram[(member.column, self.target())] - held(member.column));
+            DVector::from_iterator(size, products)
+        };
+        let matrix = normal(&self.total, &active, noise);
+        let own = solve(matrix.clone(), &right(&self.total))?;
+        let count = self.blocks.len() as f64;
+        let mut of_own = DMatrix::zeros(size, size);
+        for block in &self.blocks {
+            let rest = &self.total - block;
+            let shift = solve(normal(&rest, &active, noise), &right(&rest))? - &own;
+            of_own.ger((count - 1.0) / count, &shift, &shift, 1.0);
+        }
+        let scale = matrix.diagonal().map(|value| 1.0 / value.sqrt());
+        let scaled = DMatrix::from_fn(size, size, |i, j| matrix[(i, j)] * scale[i] * scale[j]);
+        let inverse = scaled.cholesky()?.inverse();
+        let inverse = DMatrix::from_fn(size, size, |i, j| inverse[(i, j)] * scale[i] * scale[j]);
+        for (k, member) in active.iter().enumerate() {
+            let known = noise * noise / (member.spread * member.spread);
+            if known > 0.0 {
+                of_own.ger(known, &inverse.column(k), &inverse.column(k), 1.0);
+            }
+        }
+        let mut estimates: Vec<f64> = members.iter().map(|member| member.bounds[0]).collect();
+        let mut covariance = DMatrix::zeros(members.len(), members.len());
+        let mut alone = vec![0.0; members.len()];
+        for ((i, &a), error) in open.iter().enumerate().zip(self.alone(&active, noise)) {
+            (estimates[a], alone[a]) = (own[i], error);
+            for (j, &b) in open.iter().enumerate() {
+                covariance[(a, b)] = of_own[(i, j)];
+            }
+        }
+        Some(Spread { estimates, covariance, alone })
+    }
+
+    /// Standard errors by the information of the rows alone, with nothing known beforehand.
+    fn alone(&self, members: &[Member], noise: f64) -> Vec<f64> {
+        let lengths: Vec<f64> = members.iter().map(|member| self.length(member.column).max(1e-300)).collect();
+        // Of columns that say the same, this leaves an error far beyond any tolerance.
+        const RIDGE: f64 = 1e-9;
+        let scaled = DMatrix::from_fn(members.len(), members.len(), |i, j| {
+            let product = self.total[(members[i].column, members[j].column)] / (lengths[i] * lengths[j]);
+            if i == j { product + RIDGE } else { product }
+        });
+        let inverse = scaled.cholesky().map(|factors| factors.inverse());
+        let error = |i: usize| {
+            inverse.as_ref().map_or(f64::INFINITY, |m| (noise * m[(i, i)].max(0.0)).sqrt() / lengths[i])
+        };
+        (0..members.len()).map(error).collect()
     }
 
     fn judge_all(&self, members: &[Member], noise: f64) -> Option<Judged> {
@@ -254,11 +350,14 @@ fn normal(gram: &DMatrix<f64>, members: &[Member], noise: f64) -> DMatrix<f64> {
     })
 }
 
-/// Least squares within bounds: whatever breaks its bound most is held there, and the others are solved for anew.
+/// Least squares within bounds, by an active set: the member that breaks its bound most is held there, and a held member
+/// whose gradient points back inside is released, until neither is left.
 fn fit(gram: &DMatrix<f64>, members: &[Member], noise: f64) -> Option<Vec<f64>> {
     let target = gram.nrows() - 1;
     let mut values = vec![0.0; members.len()];
     let mut free: Vec<usize> = (0..members.len()).collect();
+    // A member is released once: rounding alone could hold and release two of them in turn for ever.
+    let mut released = vec![false; members.len()];
     loop {
         let size = free.len();
         let chosen: Vec<Member> = free.iter().map(|&member| members[member]).collect();
@@ -280,12 +379,31 @@ fn fit(gram: &DMatrix<f64>, members: &[Member], noise: f64) -> Option<Vec<f64>> 
             if over > 0.0 { over / width.max(1e-300) } else { 0.0 }
         };
         let worst = free.iter().copied().max_by(|&a, &b| beyond(a).total_cmp(&beyond(b)));
-        match worst.filter(|&member| beyond(member) > 0.0) {
+        if let Some(member) = worst.filter(|&member| beyond(member) > 0.0) {
+            let [low, high] = members[member].bounds;
+            values[member] = values[member].clamp(low, high);
+            free.retain(|&other| other != member);
+            continue;
+        }
+        let inward = |member: usize| {
+            let Member { column, spread, bounds: [low, high] } = members[member];
+            if released[member] || free.contains(&member) || low >= high {
+                return 0.0;
+            }
+            let fitted: f64 =
+                members.iter().zip(&values).map(|(other, value)| value * gram[(other.column, column)]).sum();
+            let gradient = gram[(column, target)] - fitted - noise / (spread * spread) * values[member];
+            let inside = if values[member] >= high { -gradient } else { gradient };
+            inside / gram[(column, column)].sqrt().max(1e-300)
+        };
+        let back = (0..members.len()).max_by(|&a, &b| inward(a).total_cmp(&inward(b)));
+        let tolerance = 1e-9 * gram[(target, target)].sqrt();
+        match back.filter(|&member| inward(member) > tolerance) {
             None => return Some(values),
             Some(member) => {
-                let [low, high] = members[member].bounds;
-                values[member] = values[member].clamp(low, high);
-                free.retain(|&other| other != member);
+                released[member] = true;
+                free.push(member);
+                free.sort_unstable();
             }
         }
     }
@@ -388,6 +506,61 @@ mod tests {
         let found = blocks.fit(&[Member::within(0, 0.01), Member::free(1)], 0.01).unwrap();
         assert_eq!(found[0], 0.01);
         assert!(blocks.fit(&[Member::free(0), Member::free(0)], 0.01).is_none());
+    }
+
+    /// The conditions of Karush, Kuhn and Tucker: a free coefficient has no gradient, a held one is pushed outward.
+    #[test]
+    fn bounded_fits_are_the_best_within_their_bounds() {
+        let mut random = ChaCha8Rng::seed_from_u64(7);
+        let mut uniform = || f64::from(random.next_u32()) / f64::from(u32::MAX) - 0.5;
+        for _ in 0..200 {
+            let common: Vec<f64> = (0..60).map(|_| uniform()).collect();
+            let mut column = || common.iter().map(|value| value + 0.4 * uniform()).collect::<Vec<f64>>();
+            let (columns, target): (Vec<Vec<f64>>, Vec<f64>) = ((0..4).map(|_| column()).collect(), column());
+            let target: Vec<f64> = target.iter().zip(&columns[0]).map(|(a, b)| 3.0 * a - b).collect();
+            let views: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+            let blocks = Blocks::new(&views, &target, &[0; 60]);
+            let members: Vec<Member> =
+                (0..4).map(|place| Member { bounds: [-0.4, 0.7], ..Member::free(place) }).collect();
+            let found = blocks.fit(&members, 0.0).unwrap();
+            for (place, column) in columns.iter().enumerate() {
+                let left = |row: usize| {
+                    target[row] - (0..4).map(|other| found[other] * columns[other][row]).sum::<f64>()
+                };
+                let gradient: f64 = column.iter().enumerate().map(|(row, value)| value * left(row)).sum();
+                match found[place] {
+                    value if value >= 0.7 => assert!(gradient > -1e-9),
+                    value if value <= -0.4 => assert!(gradient < 1e-9),
+                    _ => assert!(gradient.abs() < 1e-9, "{gradient}"),
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_number_at_its_bound_is_no_surer_than_the_rows_make_it() {
+        let (columns, block) = columns(5, 4000);
+        let blocks = blocks(&columns, &target(&columns, 0.3), &block);
+        let members = [Member::within(0, 0.5), Member::free(1)];
+        let noise = 0.3_f64.powi(2) / 12.0;
+        let judged = blocks.judge(&members, noise).unwrap();
+        assert_eq!((judged.coefficients[0], judged.standard_error(0)), (0.5, 0.0));
+        let spread = blocks.spread(&members, noise).unwrap();
+        let expected = 0.3 / (4000_f64).sqrt();
+        assert!((spread.estimates[0] - 2.0).abs() < 5.0 * expected);
+        assert!((0.4..2.0).contains(&(spread.standard_error(0) / expected)));
+        assert!((0.9..1.1).contains(&(spread.alone[0] / expected)));
+        // Of two columns that say the same, neither is determined.
+        let twice = Blocks::new(&[&columns[0], &columns[0]], &columns[1], &block);
+        let members = [Member::within(0, 0.5), Member::within(1, 0.5)];
+        assert!(twice.spread(&members, noise).unwrap().alone[0] > 1.0);
+    }
+
+    #[test]
+    fn no_block_spans_two_logs() {
+        assert_eq!(blocks_of(&[4, 0, 2], 3), [0, 0, 1, 1, 2, 2]);
+        assert_eq!(blocks_of(&[3, 1], 1), [0, 0, 0, 1]);
+        assert_eq!(blocks_of(&[], 5), [0_usize; 0]);
     }
 
     #[test]

@@ -304,8 +304,15 @@ pub struct Corrected {
     pub declared: f64,
     /// As estimated.
     pub value: f64,
-    /// 95 % interval; `None` if the log is too short.
+    /// 95 % interval, from the bound inward if the number is at one; `None` if the log does not determine the number.
     pub ci95: Option<[f64; 2]>,
+    /// By how much the declared number may be off; `None` if it is free.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tolerance: Option<f64>,
+    /// Whether the log alone determines the number to better than half of its tolerance.
+    pub determined: bool,
+    /// Whether the estimate is at the end of the tolerance, which makes the tolerance or the model doubtful.
+    pub at_bound: bool,
 }
 
 /// Result of [`super::refine`].

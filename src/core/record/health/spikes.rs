@@ -35,7 +35,7 @@ pub(super) fn check(log: &Log, name: &str, row_s: f64, findings: &mut Findings) 
 }
 
 /// Rows that are far off the rows around them, and how far.
-fn spikes(time: &[f64], values: &[f64], row_s: f64) -> Vec<(usize, f64)> {
+pub(super) fn spikes(time: &[f64], values: &[f64], row_s: f64) -> Vec<(usize, f64)> {
     let off: Vec<f64> = time.windows(3).zip(values.windows(3)).map(|(t, v)| deviation(t, v)).collect();
     let floor = SIGMAS * spread(&off).max(smallest_step(values));
     // A row that is stamped late looks off too where the motion is fast.

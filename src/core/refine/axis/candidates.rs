@@ -109,7 +109,8 @@ impl Candidate {
 #[derive(Clone)]
 pub(super) struct Scales {
     pub(super) speed: f64,
-    pub(super) fastest: f64,
+    /// Speed that a fair share of the rows is below.
+    pub(super) slow: f64,
     /// Speed that all but a twentieth of the rows exceed, where the motion goes one way; 0 where it passes through rest.
     pub(super) slowest: f64,
     pub(super) travel: f64,
@@ -134,7 +135,7 @@ impl Scales {
         let seconds = rows.rows.iter().map(|row| row.time_s).fold(0.0, f64::max);
         Self {
             speed: rms(&speeds),
-            fastest: largest(&speeds),
+            slow: slow(&speeds),
             slowest: if rows.both_ways() { 0.0 } else { lowest_twentieth(&speeds) },
             travel: range[1] - range[0],
             effort: rms(&efforts),
@@ -151,7 +152,7 @@ impl Scales {
         let times = |shares: &[f64], of: f64| shares.iter().map(|share| share * of).collect();
         match parameter.unit(machine) {
             "s" if kind.place == Place::Actuator => {
-                times(&[1.5, 3.0, 6.0, 12.0, 25.0], self.step_s.max(0.1 / self.cutoff_hz))
+                times(&[1.5, 3.0, 6.0, 12.0, 25.0, 50.0, 100.0], self.step_s.max(0.1 / self.cutoff_hz))
             }
             "s" => times(&[0.05, 0.1, 0.2, 0.4, 0.8], self.seconds),
             "rad/s" | "m/s" => {
@@ -191,6 +192,18 @@ impl Scales {
 /// Whether a shape is a share of the largest torque.
 fn is_of_torque(parameter: &Parameter) -> bool {
     matches!(parameter.grid, Grid::OfTorque(_))
+}
+
+/// Share of the rows, and fewest of them, that a wave must be seen in.
+const SEEN: f64 = 0.1;
+const LEAST_SEEN: usize = 400;
+
+/// Speed below which a wave of the position is seen often enough.
+fn slow(speeds: &[f64]) -> f64 {
+    let mut sorted = speeds.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let place = ((SEEN * sorted.len() as f64) as usize).max(LEAST_SEEN);
+    sorted.get(place.min(sorted.len().saturating_sub(1))).copied().unwrap_or(0.0)
 }
 
 /// What a twentieth of some values is below.
@@ -247,7 +260,7 @@ pub(super) fn wave_numbers(machine: MachineKind, scales: &Scales) -> (usize, f64
     const MOST: usize = 240;
     let linear = machine == MachineKind::Linear;
     let step = if linear { 0.5 * TAU / scales.travel } else { 1.0 };
-    let seen = scales.cutoff_hz * TAU / (0.5 * scales.fastest);
+    let seen = scales.cutoff_hz * TAU / (0.5 * scales.slow);
     let count = if step > 0.0 && step.is_finite() { ((seen / step) as usize).min(MOST) } else { 0 };
     let first = if linear { 3 } else { 1 };
     (first, step, count)

@@ -11,6 +11,8 @@ const SEGMENTS: [usize; 3] = [256, 128, 64];
 const FEWEST: usize = 8;
 /// Part of the kernel's band that is looked at, as shares of the cut-off.
 const BAND: [f64; 2] = [0.1, 1.0];
+/// Share of the cut-off below which noise of the position counts for little.
+const SLOW: f64 = 0.15;
 
 /// What noise makes of a residual: that of the position, as it was measured, and a torque that is white.
 ///
@@ -52,6 +54,23 @@ impl Floor {
             position * total(|f| kernel.acceleration_noise(f)) + effort * total(|f| kernel.effort_noise(f));
         Self { variance, effort, measured: true }
     }
+}
+
+/// Frequency, Hz, at which noise of the position makes as much of the residual as everything else: beyond it the
+/// information falls with its fourth power. `None` where the rows are too few.
+pub(super) fn crossover_hz(declared: &Declared, rows: &Rows, left: &[f64]) -> Option<f64> {
+    let kernel = &rows.kernel;
+    let found = Spectrum::new(rows, Part::Fit, left)?;
+    let per_sample = |index: usize| index as f64 / (found.length * kernel.thinning) as f64;
+    let slow = |index: &usize| per_sample(*index) / kernel.step_s < SLOW * kernel.cutoff_hz;
+    let bin = 2.0 / (found.length * kernel.thinning) as f64;
+    let mut levels: Vec<f64> = (1..found.power.len())
+        .filter(slow)
+        .map(|index| found.power[index] / (bin * kernel.effort_noise(per_sample(index))))
+        .collect();
+    let effort = median(&mut levels)?;
+    let position = rows.position_noise * declared.inertia.powi(2);
+    Some((effort / position).powf(0.25) / TAU)
 }
 
 /// Mean of a power over the frequencies up to half the sample rate.

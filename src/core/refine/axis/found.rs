@@ -4,6 +4,7 @@ use crate::effects::{self, EffectError, EffectKind, Parameter, Role};
 use crate::model::{Effect, MachineKind, Model, Motor, Rig};
 use crate::refine::{
     Explorer,
+    corrected::Coefficient,
     gain::Gain,
     verdict::{Corrected, Found, Unexplained},
 };
@@ -153,18 +154,25 @@ pub(super) fn corrections(
     fit: &Fit,
     held: &[Held],
 ) -> Vec<Corrected> {
-    let t = student_t_975(fit.blocks.count().max(2) - 1);
+    let quantile = student_t_975(fit.blocks.count().max(2) - 1);
+    let spread = fit.blocks.spread(&fit.members, fit.noise);
     let corrected = |(index, nuisance): (usize, &Nuisance)| {
-        let change = fit.judged.coefficients[index];
-        let width = t * fit.judged.standard_error(index);
+        let value = fit.judged.coefficients[index];
+        let spread = spread.as_ref();
         let own = held.iter().find(|held| held.nuisance == index);
-        let ends = own.map_or([change - width, change + width], |held| held.ci95);
-        Corrected {
-            key: nuisance.key,
-            declared: declared.in_file(nuisance),
-            value: nuisance.corrected(change),
-            ci95: Some(ends.map(|end| nuisance.corrected(end))),
+        let mut found = Coefficient {
+            value,
+            estimate: spread.map_or(value, |spread| spread.estimates[index]),
+            error: spread.map_or(f64::INFINITY, |spread| spread.standard_error(index)),
+            alone: spread.map_or(f64::INFINITY, |spread| spread.alone[index]),
+            tolerance: if nuisance.free { f64::INFINITY } else { nuisance.tolerance },
+            quantile,
         }
+        .corrected(nuisance.key, declared.in_file(nuisance), |change| nuisance.corrected(change));
+        if let Some(held) = own {
+            found.ci95 = Some(held.ci95.map(|end| nuisance.corrected(end)));
+        }
+        found
     };
     nuisances.iter().enumerate().filter(|(_, nuisance)| !nuisance.key.is_empty()).map(corrected).collect()
 }

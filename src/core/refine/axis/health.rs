@@ -46,6 +46,8 @@ const DRIVEN: f64 = 1.0;
 const FASTER: f64 = 1.5;
 /// Share of the highest speed below which the lowest is next to rest.
 const AT_REST: f64 = 0.1;
+/// Shortest motion that an effect can be checked on, s.
+const LEAST_HELD_OUT_S: f64 = 0.2;
 /// Runs of equal values that are usual, from which on a column is held.
 const HELD_ROWS: usize = 3;
 
@@ -208,6 +210,20 @@ pub(super) fn check_rows(
         }
     }
     found
+}
+
+/// The finding that too little of what is held out is in motion.
+pub(super) fn check_held_out(declared: &Declared, rows: &Rows, held_out: usize) -> Option<HealthFinding> {
+    let seconds = held_out as f64 * rows.kernel.step_s * rows.kernel.thinning as f64;
+    if seconds >= LEAST_HELD_OUT_S {
+        return None;
+    }
+    let problem = format!(
+        "the axis moves for only {seconds:.1} s of what is held out and {LEAST_HELD_OUT_S} s are needed: on them nothing \
+         can be checked"
+    );
+    let mend = "hold out a log in which the axis moves for some seconds";
+    Some(finding(Severity::Error, declared.names().position, problem, mend))
 }
 
 /// The finding that rows go beyond the speeds that friction was told from.

@@ -13,6 +13,9 @@ const WAVES: usize = 8;
 /// Bins of a variable by its quantiles.
 const BINS: usize = 12;
 
+/// Periods of the cut-off over which a noisy variable is averaged.
+const SMOOTHED_PERIODS: f64 = 3.0;
+
 /// Gain on left-out blocks above which a variable explains a residual, and its standard errors above 0.
 const STRUCTURE: f64 = 0.06;
 const STRUCTURE_Z: f64 = 2.5;
@@ -90,13 +93,29 @@ pub(super) fn groups(
     let mut found = vec![
         (Variable::Position, waves(&position)),
         (Variable::Speed, bins(&speed)),
-        (Variable::Effort, bins(wanted)),
-        (Variable::Acceleration, bins(&acceleration)),
+        (Variable::Effort, bins(&smoothed(rows, wanted))),
+        (Variable::Acceleration, bins(&smoothed(rows, &acceleration))),
         (Variable::Time, waves(&time)),
     ];
     let line = strongest_line(&time, whitener, white_residual, 0.5 / rows.kernel.step_s);
     found.push((Variable::Frequency, line));
     found
+}
+
+/// Means over some periods of the cut-off: the residual has the noise of the position too, and would depend on itself.
+fn smoothed(rows: &Rows, values: &[f64]) -> Vec<f64> {
+    let reach = (SMOOTHED_PERIODS / (rows.kernel.cutoff_hz * rows.kernel.step_s)) as usize;
+    let own = &rows.rows;
+    let near =
+        |a: usize, b: usize| own[a].trace == own[b].trace && own[a].sample.abs_diff(own[b].sample) <= reach;
+    let mean = |row: usize| {
+        let before = (0..row).rev().take_while(|&other| near(row, other));
+        let after = (row..own.len()).take_while(|&other| near(row, other));
+        let (sum, count) =
+            before.chain(after).fold((0.0, 0_usize), |(sum, count), other| (sum + values[other], count + 1));
+        sum / count as f64
+    };
+    (0..own.len()).map(mean).collect()
 }
 
 fn waves(values: &[f64]) -> Vec<Vec<f64>> {

@@ -18,8 +18,9 @@ mod trace;
 mod tried;
 mod waves;
 
+use crate::effects::EffectKind;
 use crate::model::Model;
-use crate::record::{HealthFinding, Log};
+use crate::record::{self, HealthFinding, Log};
 
 use super::error::RefineError;
 use super::verdict::{Errors, Found, Refinement, Residual, Verdict};
@@ -48,9 +49,11 @@ pub(super) fn residual(
     watch: Watch<'_>,
 ) -> Result<Residual, RefineError> {
     let declared = Declared::new(model, options.motor);
+    let (acting, _) = acting(model, [logs, &[]], options);
+    let logs = acting.as_slice();
     let mut data_health = health::check(logs, &declared);
     // No number is fitted, so that every row counts.
-    let rows = Rows::new(logs, logs, declared.names(), Asked::new(options.speeds));
+    let rows = Rows::new(logs, logs, declared.names(), (Asked::new(options.speeds), f64::INFINITY));
     data_health.extend(health::check_rows(&rows, &declared, rows.rows.len(), LEAST_ROWS));
     if is_unfit(&data_health) {
         return Ok(Residual { errors: Errors::default(), tests: Vec::new(), data_health });
@@ -95,9 +98,11 @@ pub(super) fn refine(
     model: &Model,
     logs: &[Log],
     held_out: &[Log],
-    options: &Options,
+    (options, banned): (&Options, &[&'static EffectKind]),
     watch: Watch<'_>,
 ) -> Result<Refinement, RefineError> {
+    let (training, others) = acting(model, [logs, held_out], options);
+    let (logs, held_out) = (training.as_slice(), others.as_slice());
     let all_logs: Vec<&Log> = logs.iter().chain(held_out).collect();
     let (asked, mut data_health) = asked(model, [logs, held_out], options)?;
     if is_unfit(&data_health) {
@@ -115,7 +120,8 @@ pub(super) fn refine(
     if !is_driven {
         data_health.push(health::not_driven(&asked.declared));
     }
-    let library = asked.library(&whitener, is_driven);
+    let mut library = asked.library(&whitener, is_driven);
+    library.retain(|candidate| !banned.contains(&candidate.kind));
     let without = |known: &[f64]| asked.left_of(&whitener, &asked.target_with(known));
     let carried = carried::carried(&asked.declared, &asked.rows, &before.residual, without);
     data_health.extend(carried::findings(&asked.declared, &all_logs, &carried));
@@ -125,6 +131,7 @@ pub(super) fn refine(
     let clean = clean(&asked, &before, options.seed);
     search.thresholds = null::thresholds(&clean, &asked.rows, &whitener, &search, &library);
     report(watch, 0.4)?;
+    search.ban(banned);
     look(&mut search, watch)?;
     report(watch, 0.8)?;
     let fit = search.fit(&[]).unwrap_or_else(|| before.fit.clone());
@@ -133,19 +140,66 @@ pub(super) fn refine(
     Ok(Refinement { data_health, transfer: carried, ..end.refinement(model, options, &asked, &search) })
 }
 
+/// Logs with efforts that act as late as the model says, where that leaves less than efforts as they are logged: a model
+/// file without a word of it says what is usual, and some logs hold what acts.
+fn acting(model: &Model, [logs, held_out]: [&[Log]; 2], options: &Options) -> (Vec<Log>, Vec<Log>) {
+    let declared = Declared::new(model, options.motor);
+    let delayed = |logs: &[Log]| -> Vec<Log> { logs.iter().map(|log| delayed(log, &declared)).collect() };
+    let late = delayed(logs);
+    let power = |logs: &[Log]| {
+        let rows = Rows::new(logs, logs, declared.names(), (Asked::new(options.speeds), f64::INFINITY));
+        let fits = rows.rows.iter().filter(|row| row.part == Part::Fit).count() >= LEAST_ROWS;
+        let asked =
+            fits.then(|| Regression::new(declared.clone(), rows, &options.estimate).ok()).flatten()?;
+        let left = asked.left_of(&asked.whitener(), &asked.target)?;
+        Some(rms(&asked.rows, Part::Fit, &left))
+    };
+    let is_late = declared.delay_s > 0.0
+        && power(&late).zip(power(logs)).is_some_and(|(late, as_logged)| late < as_logged);
+    if is_late { (late, delayed(held_out)) } else { (logs.to_vec(), held_out.to_vec()) }
+}
+
+/// A log whose efforts act as late as the model says: a row's effort is what acts from the row on.
+fn delayed(log: &Log, declared: &Declared) -> Log {
+    let mut log = log.clone();
+    let Some(row_s) = log.column("time_s").and_then(record::row_time_s) else { return log };
+    let places = (declared.delay_s / row_s).min(log.rows() as f64);
+    let (whole, share) = (places.floor() as usize, places.fract());
+    if let Some(column) = log.columns.iter_mut().find(|column| column.name == declared.names().effort) {
+        let at = |row: usize, back: usize| column.values[row.saturating_sub(back)];
+        column.values = (0..column.values.len())
+            .map(|row| (1.0 - share) * at(row, whole) + share * at(row, whole + 1))
+            .collect();
+    }
+    log
+}
+
 /// The regression of a refinement, and what is to be said of its data, the worst first.
 fn asked(
     model: &Model,
     [logs, held_out]: [&[Log]; 2],
     options: &Options,
 ) -> Result<(Regression, Vec<HealthFinding>), RefineError> {
-    let mut declared = Declared::new(model, options.motor);
+    let declared = Declared::new(model, options.motor);
     let mut data_health = health::check(logs.iter().chain(held_out), &declared);
-    let rows = Rows::new(logs, held_out, declared.names(), Asked::new(options.speeds));
-    declared.take_over_free(&rows, &options.estimate);
-    let fitted = rows.rows.iter().filter(|row| row.part == Part::Fit).count();
-    data_health.extend(health::check_rows(&rows, &declared, fitted, LEAST_ROWS));
-    let asked = Regression::new(declared, rows, &options.estimate)?;
+    let rows = |highest_hz: f64| {
+        Rows::new(logs, held_out, declared.names(), (Asked::new(options.speeds), highest_hz))
+    };
+    let first = rows(f64::INFINITY);
+    let count = |rows: &Rows, part: Part| rows.rows.iter().filter(|row| row.part == part).count();
+    data_health.extend(health::check_rows(&first, &declared, count(&first, Part::Fit), LEAST_ROWS));
+    data_health.extend(health::check_held_out(&declared, &first, count(&first, Part::HeldOut)));
+    let regression = |mut declared: Declared, rows: Rows| {
+        declared.take_over_free(&rows, &options.estimate);
+        Regression::new(declared, rows, &options.estimate)
+    };
+    let mut asked = regression(declared.clone(), first)?;
+    if let Some(highest_hz) = asked.highest_hz() {
+        let narrow = rows(highest_hz);
+        if count(&narrow, Part::Fit) >= LEAST_ROWS {
+            asked = regression(declared, narrow)?;
+        }
+    }
     data_health.extend(asked.check_units());
     data_health.extend(asked.check_speeds());
     data_health.sort_by_key(|finding| std::cmp::Reverse(finding.severity));

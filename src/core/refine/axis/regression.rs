@@ -9,11 +9,18 @@ use crate::refine::whiten::Whitener;
 
 use super::candidates::{Candidate, Scales, library};
 use super::carried;
+use super::floor;
 use super::health;
 use super::nuisance::{Nuisance, nuisances};
 use super::rig::Declared;
 use super::search::{self, Search, White};
 use super::trace::{Part, Rows};
+
+/// Cut-off in units of the frequency at which noise of the position takes over, and the share of the cut-off that it must
+/// be below, so that it is worth a change.
+const BAND: f64 = 3.0;
+const WORTH: f64 = 0.8;
+const LOWEST_HZ: f64 = 8.0;
 
 pub(super) struct Regression {
     pub(super) declared: Declared,
@@ -35,6 +42,18 @@ impl Regression {
         let [measured, target] = declared.targets(&rows);
         let nuisances = nuisances(&declared, &rows, estimate)?;
         Ok(Self { declared, rows, measured, target, nuisances })
+    }
+
+    /// Highest frequency, Hz, of rows that say something beside the noise of the position, where it is well below the
+    /// kernel's cut-off.
+    pub(super) fn highest_hz(&self) -> Option<f64> {
+        let whitener = self.whitener();
+        if whitener.rows().len() < super::LEAST_ROWS {
+            return None;
+        }
+        let left = self.left_of(&whitener, &self.target)?;
+        let highest_hz = BAND * floor::crossover_hz(&self.declared, &self.rows, &left)?;
+        (highest_hz < WORTH * self.rows.kernel.cutoff_hz).then_some(highest_hz.max(LOWEST_HZ))
     }
 
     /// Findings about what the effort and the position say of each other.

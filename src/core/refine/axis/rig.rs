@@ -23,6 +23,8 @@ pub(super) struct Declared {
     /// As in the model file.
     declared_inertia: f64,
     pub(super) gravity: f64,
+    /// From a logged effort to the one that acts, s.
+    pub(super) delay_s: f64,
     pub(super) friction: Option<StribeckParameters>,
     pub(super) effects: Vec<Effect>,
     pub(super) tolerances: Tolerances,
@@ -58,6 +60,7 @@ impl Declared {
             inertia,
             declared_inertia: inertia,
             gravity,
+            delay_s: model.robot().map_or(0.0, |robot| robot.actuation.delay_s),
             friction: friction.map(|curve| *curve.parameters()),
             effects,
             tolerances: model.tolerance.clone(),

@@ -105,6 +105,99 @@ fn effects_are_named_and_sized() {
     }
 }
 
+/// A ripple of a shaft, small against the noise that its position's makes of the acceleration.
+fn rippling(_: f64, q: f64, _: f64) -> f64 {
+    -0.006 * (14.0 * q).sin()
+}
+
+fn extended(log: &Log, rows: usize) -> Log {
+    let last = |values: &[f64]| values[values.len() - 1];
+    let columns = log.columns.iter().map(|column| {
+        let standing = (1..=rows).map(|row| match column.name.as_str() {
+            "time_s" => last(&column.values) + row as f64 * 1e-3,
+            "torque_nm" => 0.0,
+            _ => last(&column.values),
+        });
+        (column.name.clone(), column.values.iter().copied().chain(standing).collect())
+    });
+    Log::from_columns("extended.csv", columns)
+}
+
+#[test]
+fn standing_still_at_the_end_hides_nothing() {
+    let log = extended(&shaft(1, rippling), 20_000);
+    assert_eq!(ids(&refined(SHAFT, &[log], &[], &[])), ["cogging"]);
+    let still = extended(&between(&shaft(2, rippling), 0.0..0.2), 10_000);
+    let found = refined(SHAFT, &[shaft(1, rippling)], &[still], &[]);
+    assert_eq!((found.verdict, ids(&found).len()), (Verdict::DataUnfit, 0));
+}
+
+#[test]
+fn one_bad_cell_changes_no_effect() {
+    let log = shaft(1, rippling);
+    let with = |column: &str| {
+        let columns = log.columns.iter().map(|own| {
+            let mut values = own.values.clone();
+            if own.name == column {
+                values[20_002] += 50.0;
+            }
+            (own.name.clone(), values)
+        });
+        Log::from_columns("bad.csv", columns)
+    };
+    for column in ["torque_nm", "motor_angle_rad"] {
+        let found = refined(SHAFT, &[with(column)], &[shaft(2, rippling)], &[]);
+        assert_eq!(ids(&found), ["cogging"], "{column}");
+        let named =
+            |finding: &HealthFinding| finding.column == column && finding.problem.contains("20.002 s");
+        assert!(found.data_health.iter().any(named), "{:?}", found.data_health);
+    }
+}
+
+#[test]
+fn order_of_logs_copies_and_cuts_change_no_effect() {
+    let (a, b) = (shaft(1, rippling), between(&shaft(3, rippling), 0.0..20.0));
+    let held_out = [shaft(2, rippling)];
+    let size = |logs: &[Log]| {
+        let found = refined(SHAFT, logs, &held_out, &[]);
+        assert_eq!(ids(&found), ["cogging"]);
+        let effect = &found.effects[0];
+        let place = effect.effect.parameters().iter().position(|(name, _)| name == "sin_1_nm").unwrap();
+        (effect.effect.parameters()[place].1, effect.ci95[place].unwrap())
+    };
+    let (value, [low, high]) = size(&[a.clone(), b.clone()]);
+    let (turned, _) = size(&[b.clone(), a.clone()]);
+    let (copied, [copied_low, copied_high]) = size(&[a.clone(), b.clone(), a.clone()]);
+    let (cut, _) = size(&[between(&a, 0.003..30.0), b]);
+    assert!((turned - value).abs() < 1e-9);
+    assert!((low..=high).contains(&cut), "{cut} outside {low} to {high}");
+    assert!(copied == value && (copied_high - copied_low - (high - low)).abs() < 1e-12);
+}
+
+/// A sticky spot at one angle is friction that depends on the angle in all of its harmonics.
+#[test]
+fn harmonics_of_one_cause_have_one_name() {
+    let spot = |_: f64, q: f64, v: f64| {
+        let off = (q + 0.5 * TAU).rem_euclid(TAU) - 0.5 * TAU;
+        0.03 * (-(off / 0.12).powi(2)).exp() * (v / 0.02).tanh()
+    };
+    let found = refined(SHAFT, &[shaft(1, spot)], &[shaft(2, spot)], &[]);
+    assert!(ids(&found).iter().all(|id| *id == "position_dependent_friction"), "{:?}", ids(&found));
+    assert_ne!(found.verdict, Verdict::ModelAdequate);
+}
+
+/// What the model says of the time between command and torque is no delay once more.
+#[test]
+fn a_declared_delay_counts_once() {
+    let model = crate::model_file::presets::paper();
+    let go_on = &mut |_| ControlFlow::Continue(());
+    let experiment =
+        Experiment { seconds: 60.0, ..Experiment::new(Scenario::Multisine, ControllerChoice::Pi) };
+    let log = simulate::run(&experiment, &model, &model, go_on).unwrap().log(Motor::Left);
+    let found = refine(&model, &[log], &[], &Options::default(), go_on).unwrap();
+    assert_eq!((found.verdict, ids(&found).len()), (Verdict::ModelAdequate, 0), "{:?}", ids(&found));
+}
+
 /// The refined model, written and read again, has the error that was told.
 #[test]
 fn the_refined_model_has_the_error_after() {

@@ -6,10 +6,8 @@ use crate::effects::{EffectKind, Law, MotionSample as Moment, Place};
 use crate::identify::motion::kinematics::{Stretch, near_rest, stretches, white_noise};
 use crate::model::MachineKind;
 use crate::record::Log;
-use crate::refine::{
-    select::{Blocks, Member},
-    split::split_s,
-};
+use crate::refine::select::{Blocks, Member};
+use crate::refine::split::split_rows_s;
 use crate::signal::filter::{ZeroPhase, derivative};
 
 /// Highest cut-off of the kernel, Hz.
@@ -20,6 +18,8 @@ const NOISE_SHARE: f64 = 0.05;
 const ROWS_A_PERIOD: f64 = 2.5;
 /// A speed below this share of the root mean square may be a rest.
 const REST_SHARE: f64 = 0.03;
+/// A reversal reaches up to so many times that speed.
+const REVERSING: f64 = 2.0;
 /// Share of rows in one direction below which motion goes the other way alone: the few moments of a reversal, where
 /// friction sticks, do not tell the two directions apart.
 const ONE_WAY: f64 = 0.15;
@@ -47,6 +47,8 @@ pub(super) struct Row {
     pub(super) follows: bool,
     /// Time since the start of its log, s.
     pub(super) time_s: f64,
+    /// Whether the axis reverses nearby: friction that sticks for a moment takes any value there.
+    pub(super) reverses: bool,
 }
 
 /// A stretch of a log with its motion.
@@ -170,7 +172,13 @@ pub(super) struct Names {
 
 impl Rows {
     /// Rows of `logs`, of which the last third is held out unless there are logs `held_out`.
-    pub(super) fn new(logs: &[Log], held_out: &[Log], names: Names, asked: Asked) -> Self {
+    /// `highest_hz` limits the kernel's cut-off.
+    pub(super) fn new(
+        logs: &[Log],
+        held_out: &[Log],
+        names: Names,
+        (asked, highest_hz): (Asked, f64),
+    ) -> Self {
         let cut = |log: &Log| {
             let column = |name: &str| log.column(name).unwrap_or_default();
             stretches(column("time_s"), column(names.position), column(names.effort))
@@ -183,7 +191,7 @@ impl Rows {
             logs.iter().map(|log| noise_of_rows(log, names.position, asked)).fold(0.0, f64::max);
         let effort_noise = white_noise(all().flat_map(|stretch| stretch.effort.windows(5)));
         let with_speed: Vec<Stretch> = logs.iter().flat_map(|log| with_speed(log, names)).collect();
-        let kernel = choose_kernel(all(), &with_speed, step_s, position_noise, asked);
+        let kernel = choose_kernel(all(), &with_speed, (step_s, highest_hz), position_noise, asked);
         let agreement = agreement(&kernel, &with_speed, asked);
         let mut found = Self {
             traces: Vec::new(),
@@ -197,35 +205,24 @@ impl Rows {
         };
         let (mut resting, mut samples) = (0, 0);
         for (log, stretches) in fitted.into_iter().enumerate() {
-            let end_s = stretches.last().map_or(0.0, end_s);
             let start_s = stretches.first().map_or(0.0, |stretch| stretch.start_s);
-            let [last_s, first_s] = split_s(end_s - start_s);
-            let part = |time_s: f64| match time_s {
-                _ if !held_out.is_empty() => Some(Part::Fit),
-                time_s if time_s < last_s => Some(Part::Fit),
-                time_s if time_s >= first_s => Some(Part::HeldOut),
-                _ => None,
-            };
-            let counts = found.add(log, stretches, start_s, part);
+            let counts = found.add(log, stretches, start_s, Part::Fit);
             resting += counts[0];
             samples += counts[1];
         }
+        if held_out.is_empty() {
+            found.hold_out_last_third(logs.len());
+        }
         for (log, stretches) in others.into_iter().enumerate() {
             let start_s = stretches.first().map_or(0.0, |stretch| stretch.start_s);
-            found.add(logs.len() + log, stretches, start_s, |_| Some(Part::HeldOut));
+            found.add(logs.len() + log, stretches, start_s, Part::HeldOut);
         }
         found.rest_share = resting as f64 / samples.max(1) as f64;
         found
     }
 
     /// Adds the stretches of a log; numbers of resting and of all samples.
-    fn add(
-        &mut self,
-        log: usize,
-        stretches: Vec<Stretch>,
-        log_start_s: f64,
-        part: impl Fn(f64) -> Option<Part>,
-    ) -> [usize; 2] {
+    fn add(&mut self, log: usize, stretches: Vec<Stretch>, log_start_s: f64, part: Part) -> [usize; 2] {
         let mut counts = [0; 2];
         let motions: Vec<Vec<f64>> = stretches
             .iter()
@@ -254,25 +251,59 @@ impl Rows {
                 acceleration,
                 second,
             };
-            self.add_rows(&trace, &resting, &part);
+            let slow: Vec<bool> = trace.speed.iter().map(|v| v.abs() < REVERSING * rest_speed).collect();
+            self.add_rows(&trace, [&resting, &widened(&slow, 2 * blur)], part);
             self.traces.push(trace);
         }
         counts
     }
 
-    fn add_rows(&mut self, trace: &Trace, resting: &[bool], part: impl Fn(f64) -> Option<Part>) {
+    /// Holds out the last third of the rows in motion of each log, after a gap.
+    fn hold_out_last_third(&mut self, logs: usize) {
+        let splits: Vec<[f64; 2]> = (0..logs)
+            .map(|log| {
+                let counts = |row: &&Row| self.traces[row.trace].log == log && row.part != Part::Beside;
+                let times: Vec<f64> = self.rows.iter().filter(counts).map(|row| row.time_s).collect();
+                let own = self.traces.iter().filter(|trace| trace.log == log);
+                let ends = own.map(|trace| trace.start_s + trace.step_s * trace.position.len() as f64);
+                split_rows_s(&times, ends.fold(0.0, f64::max))
+            })
+            .collect();
+        let mut follows = true;
+        let rows = std::mem::take(&mut self.rows);
+        for mut row in rows {
+            let [end_s, begin_s] = splits[self.traces[row.trace].log];
+            if (end_s..begin_s).contains(&row.time_s) {
+                follows = false;
+                continue;
+            }
+            if row.part == Part::Fit && row.time_s >= begin_s {
+                row.part = Part::HeldOut;
+            }
+            row.follows &= std::mem::replace(&mut follows, true);
+            self.rows.push(row);
+        }
+    }
+
+    fn add_rows(&mut self, trace: &Trace, [resting, reversing]: [&[bool]; 2], part: Part) {
         let samples = trace.position.len();
         let ends = (END_PERIODS / (self.kernel.cutoff_hz * trace.step_s)) as usize;
         let mut before = None;
         for sample in (ends..samples.saturating_sub(ends)).step_by(self.kernel.thinning) {
             let time_s = trace.start_s + sample as f64 * trace.step_s;
-            let part = part(time_s).filter(|_| !resting[sample]);
-            let part =
-                part.map(|part| if self.asked.about(trace.speed[sample]) { part } else { Part::Beside });
+            let part = if self.asked.about(trace.speed[sample]) { part } else { Part::Beside };
+            let part = (!resting[sample]).then_some(part);
             if let Some(part) = part {
                 let follows = before
                     .is_some_and(|before| before == part || before == Part::Beside || part == Part::Beside);
-                self.rows.push(Row { trace: self.traces.len(), sample, part, follows, time_s });
+                self.rows.push(Row {
+                    trace: self.traces.len(),
+                    sample,
+                    part,
+                    follows,
+                    time_s,
+                    reverses: reversing[sample],
+                });
             }
             before = part;
         }
@@ -403,6 +434,15 @@ impl Trace {
     }
 }
 
+/// Samples that are no further than `reach` from a true one.
+fn widened(flags: &[bool], reach: usize) -> Vec<bool> {
+    let mut found = vec![false; flags.len()];
+    for place in (0..flags.len()).filter(|&place| flags[place]) {
+        found[place.saturating_sub(reach)..(place + reach + 1).min(flags.len())].fill(true);
+    }
+    found
+}
+
 /// Variance of white noise in a column, from what the rows around a row foretell of it: a cubic through two on either
 /// side, at their own times, so that jitter of the clock counts as noise of a moving axis.
 fn noise_of_rows(log: &Log, name: &str, asked: Asked) -> f64 {
@@ -427,19 +467,15 @@ fn noise_of_rows(log: &Log, name: &str, asked: Asked) -> f64 {
     sum / count.max(1) as f64
 }
 
-fn end_s(stretch: &Stretch) -> f64 {
-    stretch.start_s + stretch.step_s * (stretch.position.len() - 1) as f64
-}
-
 /// The highest cut-off at which noise of the position is a small part of the acceleration.
 fn choose_kernel<'a>(
     stretches: impl Iterator<Item = &'a Stretch> + Clone,
     with_speed: &[Stretch],
-    step_s: f64,
+    (step_s, highest_hz): (f64, f64),
     position_noise: f64,
     asked: Asked,
 ) -> Kernel {
-    let highest = HIGHEST_CUTOFF_HZ.min(0.25 / step_s);
+    let highest = HIGHEST_CUTOFF_HZ.min(0.25 / step_s).min(highest_hz);
     let divisors = [1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0];
     let kernels = divisors.map(|divisor| Kernel::new(highest / divisor, step_s));
     let share = |kernel: &Kernel| {

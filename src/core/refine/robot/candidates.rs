@@ -2,7 +2,7 @@
 
 use std::num::NonZeroUsize;
 
-use crate::effects::{EffectKind, Form, Grid, KINDS, Parameter, Step};
+use crate::effects::{EffectKind, Form, Grid, KINDS, Parameter, Place, Step};
 use crate::model::MachineKind;
 use crate::parallel;
 
@@ -117,11 +117,38 @@ impl Candidate {
         self.pairs.iter().enumerate().map(|(i, _)| ranges[i % ranges.len()]).collect()
     }
 
+    /// Whether a shape that is refined is at the end of its range.
+    pub(super) fn is_at_an_end(&self) -> bool {
+        let moves = self.moves(1.0);
+        let mut shapes = self.kind.shapes().zip(&self.shape).zip(&moves);
+        shapes.any(|((parameter, value), step)| {
+            let [low, high] = parameter.range(MachineKind::Robot);
+            let (down, up) = match step {
+                Some(Move::Factor(_)) if low > 0.0 => (low * NEAR_THE_END, high / NEAR_THE_END),
+                _ => return false,
+            };
+            !(down..=up).contains(value)
+        })
+    }
+
+    /// Whether its time is longer than what the timing of the log's own torque leaves open.
+    pub(super) fn is_resolved(&self, row_s: f64) -> bool {
+        let is_time = |parameter: &Parameter| parameter.sized && parameter.unit(MachineKind::Robot) == "s";
+        let timed = self.kind.place == Place::Actuator && self.kind.shapes().next().is_some_and(is_time);
+        !timed || self.shape[0] > LEAST_ROWS * row_s
+    }
+
     /// Whether more than one of the kind can be in a robot.
     pub(super) fn repeats(&self) -> bool {
         self.kind.series() || self.kind.trial.repeats
     }
 }
+
+/// Factor within which a shape is at the end of its range.
+const NEAR_THE_END: f64 = 1.05;
+
+/// Least time of an actuator's effect, in rows.
+const LEAST_ROWS: f64 = 1.5;
 
 /// Highest order whose waves pass the kernel for some of the time.
 const BAND_HZ: f64 = 22.0;
@@ -130,7 +157,7 @@ const BAND_HZ: f64 = 22.0;
 const ORDERS_AT_ONCE: usize = 10;
 
 /// Ground waves that are tried: longest and shortest, m, and the factor between neighbours.
-const WAVES_M: [f64; 3] = [2.5, 0.1, 1.1];
+pub(super) const WAVES_M: [f64; 3] = [2.5, 0.08, 1.1];
 /// Most places along the way.
 const MOST_PLACES: f64 = 40.0;
 
@@ -148,7 +175,10 @@ pub(super) fn library(trace: &Trace, threads: NonZeroUsize) -> Vec<Candidate> {
     let made = parallel::map(&wanted, threads, |(kind, form, shapes)| {
         Candidate::several(trace, kind, *form, shapes)
     });
-    made.into_iter().flatten().filter(|candidate| !candidate.pairs.is_empty()).collect()
+    made.into_iter()
+        .flatten()
+        .filter(|candidate| !candidate.pairs.is_empty() && candidate.is_resolved(trace.row_s()))
+        .collect()
 }
 
 fn waves() -> Vec<Vec<f64>> {

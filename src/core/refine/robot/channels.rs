@@ -12,7 +12,7 @@ use super::trace::{Pair, Part, Trace};
 
 const ORDER: usize = 10;
 /// Beginning of a log that is not used, s: what friction held before it, and how the robot moved, nobody knows.
-const BEGINNING_S: f64 = 0.5;
+const BEGINNING_S: f64 = 1.0;
 /// Rows of one piece of the spectrum.
 const PIECE: usize = 512;
 /// Band whose level is taken for all that is below it, Hz.

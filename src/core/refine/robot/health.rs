@@ -158,16 +158,11 @@ fn of_signals(log: &Log, readings: &Readings, robot: &RobotModel) -> Vec<HealthF
     let lag = ((0.1 / readings.dt_s) as usize).max(2);
     let dt_s = readings.dt_s;
     let pitch = changes(&readings.pitch_rad, lag);
-    let rms = |values: &[f64]| (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt();
     let moved = changes(&readings.angle_rad[0], lag);
-    if rms(&moved) < STILL_MOTOR_RAD && rms(&pitch) < STILL_PITCH_RAD {
-        let problem = "the robot hardly moves, so that effects cannot be told apart".to_owned();
-        found.push(finding(
-            Severity::Error,
-            "motor_angle_left_rad",
-            problem,
-            "drive to and fro, with tones of torque on top",
-        ));
+    if is_still(readings) {
+        let problem = "the robot hardly moves, so that few effects can be identified".to_owned();
+        let mend = "drive back and forth, with a multisine of torque on top, to have more of it identified";
+        found.push(finding(Severity::Warning, "motor_angle_left_rad", problem, mend));
         return found;
     }
     let turned = relation(&pitch, &sums(&readings.rate_rad_s, lag, dt_s));
@@ -330,14 +325,31 @@ fn crosswise(readings: &Readings) -> Option<HealthFinding> {
     Some(finding(Severity::Error, "torque_left_nm", problem, mend))
 }
 
+/// Whether a robot stands: one that only hunts about its place, among friction that sticks.
+pub(super) fn is_still(readings: &Readings) -> bool {
+    let lag = ((0.1 / readings.dt_s) as usize).max(2);
+    let rms = |values: &[f64]| (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt();
+    rms(&changes(&readings.angle_rad[0], lag)) < STILL_MOTOR_RAD
+        && rms(&changes(&readings.pitch_rad, lag)) < STILL_PITCH_RAD
+}
+
 /// Findings about the equations: a torque that cannot be what moves this robot.
 pub(super) fn check_motion(trace: &Trace<'_>) -> Vec<HealthFinding> {
+    // Of a robot that stands, friction takes most of the torque.
+    if !trace.moves() {
+        return Vec::new();
+    }
     let residual = trace.residual();
     let torque = trace.torque_nm();
     // r2 = (what the motion asks for) + T: of the right unit and sign the motion asks for −T.
     let asked: Vec<f64> = residual[1].iter().zip(&torque).map(|(r2, torque)| torque - r2).collect();
+    // A constant is an offset of the pitch, and no matter of unit or sign.
+    let varying = |column: &[f64]| -> Vec<f64> {
+        let mean = column.iter().sum::<f64>() / column.len().max(1) as f64;
+        column.iter().map(|value| value - mean).collect()
+    };
     let spread = quantile(&torque.iter().map(|t| t.abs()).collect::<Vec<_>>(), 0.9);
-    let (slope, correlation) = relation(&torque, &asked);
+    let (slope, correlation) = relation(&varying(&torque), &varying(&asked));
     let problem = if spread < 0.02 {
         "the motors hardly push, so that effects cannot be told apart".to_owned()
     } else if correlation < -0.5 {

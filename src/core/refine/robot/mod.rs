@@ -12,6 +12,7 @@ mod bias;
 mod candidates;
 mod chance;
 mod channels;
+mod dependence;
 mod found;
 mod gaps;
 mod health;
@@ -21,6 +22,7 @@ mod lines;
 mod motion;
 mod nuisance;
 mod search;
+mod smooth;
 mod trace;
 mod tried;
 mod twin;
@@ -29,11 +31,12 @@ mod waves;
 
 use std::num::NonZeroUsize;
 
-use crate::effects::{Form, MotionSample as Moment};
+use crate::effects::{EffectKind, Form, MotionSample as Moment};
 use crate::model::{Model, RobotModel};
 use crate::record::{HealthFinding, Log, LogKind};
 use crate::signal::quantile::student_t_975;
 
+use super::corrected::Coefficient;
 use super::error::RefineError;
 use super::verdict::{
     Channels as PerChannel, Corrected, Errors, Found, Quantity, Refinement, Residual, Verdict,
@@ -121,7 +124,7 @@ pub(super) fn refine(
     model: &Model,
     logs: &[Log],
     held_out: &[Log],
-    options: &Options,
+    (options, banned): (&Options, &[&'static EffectKind]),
     watch: Watch<'_>,
 ) -> Result<Refinement, RefineError> {
     let robot = robot_of(model, logs)?;
@@ -138,7 +141,7 @@ pub(super) fn refine(
     let of_log = |log: Readings| if is_late { log.acting(robot) } else { log.without_offsets(robot) };
     let acting = |readings: Vec<Readings>| readings.into_iter().map(of_log).collect::<Vec<_>>();
     let (training, others) = (acting(training), acting(others));
-    let bias = found::gyro_bias(&training, &others);
+    let bias = found::gyro_bias(&training, &others).filter(|bias| !banned.contains(&bias.effect.kind()));
     let mut trace = Trace::new(robot, training, others);
     data_health.extend(health::check_motion(&trace));
     if is_unfit(&data_health) {
@@ -151,12 +154,15 @@ pub(super) fn refine(
         data_health.push(health::inseparable());
         Ok(Refinement::unfit(model, data_health))
     };
+    // Of a robot that stands, friction that sticks takes any torque, and accelerations are noise.
+    let moves = trace.moves();
     let mut is_last = false;
     loop {
         let done = if is_last { 0.55 } else { 0.1 };
         report(watch, done)?;
         let target = trace.residual();
         let (mut free, mut tried) = (nuisances(&trace, known), library(&trace, THREADS));
+        tried.retain(|candidate| moves && !banned.contains(&candidate.kind));
         whitened(&mut tried, &mut free, &channels, THREADS);
         let by_chance =
             || *chance.get_or_init(|| by_chance(&trace, &channels, &free, &target, (known, options.seed)));
@@ -266,7 +272,7 @@ fn answer(
     let bare = bare.as_ref().unwrap_or(fit);
     let rows = search.rows() as f64;
     let (lacking, leftover) = (bare.score / rows - 1.0, fit.score / rows - 1.0);
-    let structure = leftover::structure(search, fit);
+    let structure = if trace.moves() { leftover::structure(search, fit) } else { None };
     let share = 1.0 - leftover / lacking;
     // A moment that is left beside what explains most of it does not make that doubtful. A wave over the motor's angle
     // does: of what is said to depend on a place nothing is left that depends on it.
@@ -290,7 +296,7 @@ fn answer(
     let after = errors(trace, search.channels, &left_after);
     let unexplained = match structure {
         Some(structure) => Some(structure.told),
-        None if effects.is_empty() => leftover::only_held_out(search, fit),
+        None if effects.is_empty() && trace.moves() => leftover::only_held_out(search, fit),
         None => None,
     };
     let verdict = match (effects.is_empty(), &unexplained) {
@@ -354,16 +360,25 @@ fn explorer(search: &Search<'_>, before: &Pair, after: &Pair) -> Explorer {
 }
 
 fn corrections(nuisances: &[Nuisance], fit: &Fit) -> Vec<Corrected> {
-    let t = student_t_975(fit.blocks.count().max(2) - 1);
+    let quantile = student_t_975(fit.blocks.count().max(2) - 1);
+    let spread = fit.blocks.spread(&fit.members, 1.0);
     let corrected = |(index, nuisance): (usize, &Nuisance)| {
-        let value = nuisance.corrected(fit.judged.coefficients[index]);
-        let width = t * nuisance.per_motor * fit.judged.standard_error(index);
-        Corrected {
-            key: nuisance.key,
-            declared: nuisance.declared,
+        let value = fit.judged.coefficients[index];
+        let spread = spread.as_ref();
+        Coefficient {
             value,
-            ci95: Some([value - width, value + width]),
+            estimate: spread.map_or(value, |spread| spread.estimates[index]),
+            error: spread
+                .map_or(f64::INFINITY, |spread| spread.standard_error(index))
+                .hypot(nuisance.between_motors / nuisance.per_motor),
+            // Friction next to rest, where the static one acts, is free.
+            alone: spread
+                .filter(|_| nuisance.key != "static_nm")
+                .map_or(f64::INFINITY, |spread| spread.alone[index]),
+            tolerance: nuisance.tolerance,
+            quantile,
         }
+        .corrected(nuisance.key, nuisance.declared, |coefficient| nuisance.corrected(coefficient))
     };
     nuisances.iter().enumerate().filter(|(_, nuisance)| !nuisance.key.is_empty()).map(corrected).collect()
 }

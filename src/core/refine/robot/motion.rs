@@ -7,6 +7,7 @@ use crate::model::{Accelerations, Coefficients, RobotModel};
 use crate::record::Log;
 
 use super::kernel::Kernel;
+use super::smooth;
 
 /// Half the window of the speed that is taken from the encoders, s.
 const SPEED_HALF_S: f64 = 0.012;
@@ -96,7 +97,7 @@ impl Readings {
 
     /// Torques that act later than they are logged.
     fn delayed(mut self, delay_s: f64) -> Self {
-        let places = delay_s / self.dt_s;
+        let places = (delay_s / self.dt_s).min(self.rows() as f64);
         let (whole, share) = (places.floor() as usize, places.fract());
         for torque in &mut self.torque_nm {
             let at = |row: usize, back: usize| torque[row.saturating_sub(back)];
@@ -289,11 +290,12 @@ impl<'a> Way<'a> {
         let rate = line(rows, &places, &said_rate);
         let mut way = Self { readings, shafts, robot, loads, pitch, rate };
         let coefficients = robot.parameters.coefficients();
-        // The model's motion between two readings, bent by a line so that it goes through both.
-        let bent = |free: &[f64], said: &[f64]| -> Vec<f64> {
-            let errors: Vec<f64> =
-                places.iter().zip(said).map(|(&place, said)| said - value_at(free, place)).collect();
-            free.iter().zip(line(rows, &places, &errors)).map(|(free, error)| free + error).collect()
+        let errors = |free: &[f64], said: &[f64]| -> Vec<f64> {
+            places.iter().zip(said).map(|(&place, said)| said - value_at(free, place)).collect()
+        };
+        // The model's motion between two readings, bent by lines.
+        let bent = |free: &[f64], errors: &[f64]| -> Vec<f64> {
+            free.iter().zip(line(rows, &places, errors)).map(|(free, error)| free + error).collect()
         };
         for _ in 0..2 {
             let (mut free_rate, mut sum) = (Vec::with_capacity(rows), 0.0);
@@ -303,14 +305,15 @@ impl<'a> Way<'a> {
                 let accel = way.accelerations(&coefficients, sincos, shafts.both[row], row);
                 sum += dt * accel.pitch_accel_rad_s2;
             }
-            way.rate = bent(&free_rate, &said_rate);
+            way.rate = bent(&free_rate, &errors(&free_rate, &said_rate));
             let (mut free_pitch, mut sum) = (Vec::with_capacity(rows), 0.0);
             for row in 0..rows {
                 free_pitch.push(sum);
                 let next = way.rate[(row + 1).min(rows - 1)];
                 sum += 0.5 * dt * (way.rate[row] + next);
             }
-            way.pitch = bent(&free_pitch, &said_pitch);
+            // The integral of the rate drifts slowly, and readings of the pitch are noisy each by itself.
+            way.pitch = bent(&free_pitch, &smooth::random_walk(&errors(&free_pitch, &said_pitch)));
         }
         way
     }

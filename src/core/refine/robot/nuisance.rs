@@ -1,6 +1,6 @@
 //! Declared numbers, free within their tolerances.
 
-use crate::effects::{Action, Form, KINDS, MotionSample as Moment};
+use crate::effects::{Action, EffectKind, Form, KINDS, MotionSample as Moment};
 use crate::friction::StribeckParameters;
 use crate::model::Tolerances;
 use crate::refine::select::Member;
@@ -38,9 +38,13 @@ pub(super) struct Nuisance {
     /// Key as in the model file; empty for what no file declares.
     pub(super) key: &'static str,
     pub(super) declared: f64,
+    /// Effects that stand for the same without a tolerance: beside one of them the number stays as declared.
+    effects: &'static [&'static str],
     /// Share of a coefficient that the declared number changes by: a column of friction stands for the sum of all motors,
     /// the number for one of them.
     pub(super) per_motor: f64,
+    /// Standard deviation of half the difference between the motors' numbers, which their sum does not show.
+    pub(super) between_motors: f64,
     /// By how much a coefficient may be off.
     pub(super) tolerance: f64,
     pub(super) pair: Pair,
@@ -53,14 +57,22 @@ impl Nuisance {
         self.declared + self.per_motor * coefficient
     }
 
-    /// Its part in a fit, as a column.
-    pub(super) fn member(&self, column: usize) -> Member {
-        if self.tolerance.is_finite() { Member::within(column, self.tolerance) } else { Member::free(column) }
+    /// Its part in a fit beside effects of some kinds, as a column.
+    pub(super) fn member(&self, column: usize, beside: impl Iterator<Item = &'static EffectKind>) -> Member {
+        if { beside }.any(|kind| self.effects.contains(&kind.id)) {
+            Member { bounds: [0.0; 2], spread: 1e-12, ..Member::free(column) }
+        } else if self.tolerance.is_finite() {
+            Member::within(column, self.tolerance)
+        } else {
+            Member::free(column)
+        }
     }
 }
 
 /// Angles that the IMU's mounting and the floor are off by without anybody calling it an effect, rad.
 const MOUNTING_RAD: f64 = 5e-4;
+/// Rows by which a sampled torque may act earlier or later than the model says without anybody calling it an effect.
+const TIMING_ROWS: f64 = 1.0;
 /// Numbers that each motor has.
 const FRICTION: [&str; 4] = ["coulomb_nm", "static_nm", "viscous_nm_s_rad", "offset_nm"];
 /// Share of the friction that nobody knows next to rest, and the speed below which, rad/s.
@@ -77,13 +89,31 @@ pub(super) fn nuisances(trace: &Trace, known: Known<'_>) -> Vec<Nuisance> {
     let motors = friction.iter().flatten().count();
     let per_motor = |key: &str| if FRICTION.contains(&key) && motors > 1 { 1.0 / motors as f64 } else { 1.0 };
     let mut found = Vec::new();
-    let mut add = |key: &'static str, declared: f64, tolerance: f64, pair: Pair| {
+    let between = |key: &str, of: OfCurve| {
+        let each = friction.iter().flatten().map(|f| (known.share_of(key) * of(f)).powi(2) / 3.0);
+        if motors > 1 { 0.5 * each.sum::<f64>().sqrt() } else { 0.0 }
+    };
+    let mut add = |key: &'static str,
+                   declared: f64,
+                   [tolerance, between_motors]: [f64; 2],
+                   effects: &'static [&'static str],
+                   pair: Pair| {
         let free = !key.is_empty() && known.estimate.iter().any(|name| name == key || name == "all");
         let tolerance = if free { f64::INFINITY } else { tolerance };
         // A column of nothing has nothing to say of its number.
         if tolerance > 0.0 && pair.iter().flatten().any(|value| *value != 0.0) {
             let per_motor = per_motor(key);
-            found.push(Nuisance { key, declared, per_motor, tolerance, pair, white: Vec::new() });
+            let between_motors = if free { 0.0 } else { between_motors };
+            found.push(Nuisance {
+                key,
+                declared,
+                effects,
+                per_motor,
+                between_motors,
+                tolerance,
+                pair,
+                white: Vec::new(),
+            });
         }
     };
     let of_kind = |id: &str| {
@@ -91,15 +121,16 @@ pub(super) fn nuisances(trace: &Trace, known: Known<'_>) -> Vec<Nuisance> {
         trace.columns(kind, Form::Law, &[]).swap_remove(0)
     };
     for (key, declared, effect) in [
-        ("body_mass_kg", p.body_mass_kg, "mass_error"),
-        ("com_height_m", p.com_height_m, "com_height_error"),
-        ("body_inertia_kg_m2", p.body_inertia_kg_m2, "body_inertia_error"),
-        ("wheel_inertia_kg_m2", p.wheel_inertia_kg_m2, "inertia_error"),
+        ("body_mass_kg", p.body_mass_kg, &["mass_error"]),
+        ("com_height_m", p.com_height_m, &["com_height_error"]),
+        ("body_inertia_kg_m2", p.body_inertia_kg_m2, &["body_inertia_error"]),
+        ("wheel_inertia_kg_m2", p.wheel_inertia_kg_m2, &["inertia_error"]),
     ] {
-        add(key, declared, known.share_of(key) * declared, of_kind(effect));
+        add(key, declared, [known.share_of(key) * declared, 0.0], effect, of_kind(effect[0]));
     }
     let wheels = trace.pair(|| |m: &Moment| Action::force(-2.0 * m.x_accel_m_s2, 0.0, 0.0));
-    add("wheel_mass_kg", p.wheel_mass_kg, known.share_of("wheel_mass_kg") * p.wheel_mass_kg, wheels);
+    let tolerance = known.share_of("wheel_mass_kg") * p.wheel_mass_kg;
+    add("wheel_mass_kg", p.wheel_mass_kg, [tolerance, 0.0], &[], wheels);
     let both = |of: OfCurve| friction.iter().flatten().map(|f| of(f) * of(f)).sum::<f64>().sqrt();
     let curve = friction.iter().flatten().next().copied();
     let fading = move |m: &Moment| {
@@ -119,17 +150,27 @@ pub(super) fn nuisances(trace: &Trace, known: Known<'_>) -> Vec<Nuisance> {
         ("offset_nm", |f| f.offset_nm, trace.pair(|| |_: &Moment| Action::motor(-1.0))),
     ];
     for (key, of, pair) in of_curve {
-        add(key, curve.map_or(0.0, |f| of(&f)), known.share_of(key) * both(of), pair);
+        let declared = curve.map_or(0.0, |f| of(&f));
+        add(key, declared, [known.share_of(key) * both(of), between(key, of)], &[], pair);
     }
     let rest = REST_SHARE * both(|f| f.static_nm);
-    add(
-        "",
-        0.0,
-        rest,
-        trace
-            .pair(|| |m: &Moment| Action::friction(libm::exp(-m.motor_speed_rad_s.abs() / REST_SPEED_RAD_S))),
-    );
-    add("", 0.0, MOUNTING_RAD, of_kind("pitch_offset"));
-    add("", 0.0, MOUNTING_RAD, of_kind("ground_slope"));
+    let fades = |m: &Moment| Action::friction(libm::exp(-m.motor_speed_rad_s.abs() / REST_SPEED_RAD_S));
+    add("", 0.0, [rest, 0.0], &[], trace.pair(|| fades));
+    for effect in [&["pitch_offset"], &["ground_slope"]] {
+        add("", 0.0, [MOUNTING_RAD, 0.0], effect, of_kind(effect[0]));
+    }
+    let late: &[&str] = &["command_delay", "actuator_lag"];
+    add("", 0.0, [TIMING_ROWS * trace.row_s(), 0.0], late, timing(trace));
     found
+}
+
+/// What a torque that acts a second later changes.
+fn timing(trace: &Trace) -> Pair {
+    trace.pair(|| {
+        let mut before = None;
+        move |m: &Moment| {
+            let last = before.replace(m.torque_sum_nm).unwrap_or(m.torque_sum_nm);
+            Action::motor((last - m.torque_sum_nm) / m.dt_s)
+        }
+    })
 }

@@ -40,7 +40,8 @@ fn held_out_logs_are_checked_and_have_the_rate_of_the_others() {
         (half, "time_s", "one filter is used for all logs"),
     ] {
         let logs = std::slice::from_ref(&log);
-        let found = refine(&model, logs, &[held_out], &Options::default(), &mut go_on).unwrap();
+        let found =
+            crate::refine::refine(&model, logs, &[held_out], &Options::default(), &mut go_on).unwrap();
         let mut errors = found.data_health.iter().filter(|finding| finding.severity == Severity::Error);
         assert_eq!(found.verdict, Verdict::DataUnfit);
         assert!(
@@ -83,6 +84,35 @@ fn friction_of_both_motors_is_told_per_motor() {
     let [low, high] = viscous.ci95.unwrap();
     let truth = viscous.declared + MORE;
     assert!(low < truth && truth < high && high - low < 4.0 * MORE, "{low} {high} {truth}");
+}
+
+/// A robot that is as declared lacks nothing, and its numbers stay where they are declared.
+#[test]
+fn a_simulated_robot_lacks_nothing_and_keeps_its_numbers() {
+    let model = presets::paper();
+    let found =
+        crate::refine::refine(&model, &[run(&model, 60.0)], &[], &Options::default(), &mut go_on).unwrap();
+    assert_eq!((found.verdict, found.effects.len()), (Verdict::ModelAdequate, 0), "{:?}", found.unexplained);
+    for own in &found.parameters {
+        if let Some([low, high]) = own.ci95 {
+            assert!(low < high, "{} has an interval without a width", own.key);
+            assert!((low..=high).contains(&own.declared), "{}: {low} {high}", own.key);
+        }
+    }
+}
+
+/// An IMU that is mounted askew is named, and nothing else.
+#[test]
+fn a_mounting_angle_of_the_size_of_the_papers_is_a_pitch_offset() {
+    let model = presets::paper();
+    let mut actual = model.clone();
+    let Rig::Robot(robot) = &mut actual.rig else { panic!("the paper's model is a robot") };
+    robot.sensors.imu_mount_angle_rad = 0.016;
+    let found =
+        crate::refine::refine(&model, &[run(&actual, 60.0)], &[], &Options::default(), &mut go_on).unwrap();
+    assert_eq!(found.effects.iter().map(|own| own.effect.id()).collect::<Vec<_>>(), ["pitch_offset"]);
+    let [low, high] = found.effects[0].ci95[0].unwrap();
+    assert!((low..=high).contains(&-0.016) || (low..=high).contains(&0.016), "{low} {high}");
 }
 
 /// A rope that does not pull back is a slope, which is simpler.

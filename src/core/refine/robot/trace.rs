@@ -7,6 +7,7 @@ use crate::effects::{Action, EffectKind, Form, Law, Machine, MotionSample as Mom
 use crate::model::{Effect, Motor, RobotModel};
 use crate::refine::split::split_s;
 
+use super::health;
 use super::kernel::Kernel;
 use super::motion::{Loads, Motion, Readings, late_residual, of_action};
 use super::waves;
@@ -136,6 +137,16 @@ impl<'a> Trace<'a> {
             (&piece.readings, piece.motion.moments[0].as_slice(), rows)
         })
         .collect()
+    }
+
+    /// Whether the robot moves in any of the logs.
+    pub(super) fn moves(&self) -> bool {
+        !self.pieces.iter().all(|piece| health::is_still(&piece.readings))
+    }
+
+    /// Time between rows of the logs, s.
+    pub(super) fn row_s(&self) -> f64 {
+        self.pieces.first().map_or(1e-3, |piece| piece.readings.dt_s)
     }
 
     /// Time between rows, s.

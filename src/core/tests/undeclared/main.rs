@@ -263,12 +263,13 @@ fn a_log_of_other_wheels_is_unfit() {
 }
 
 #[test]
-fn a_robot_at_rest_is_unfit() {
+fn a_robot_at_rest_gets_no_effect_and_a_warning() {
     let case = cases::clean(0, 0.0);
     let still = Conditions { excitation: 0.0, ..SHORT };
     let log = Log::from_columns("still", case.record(false, still).unwrap());
     let found = refined(&case, log);
-    assert_eq!((found.verdict, ids(&found).len()), (Verdict::DataUnfit, 0), "{:?}", found.data_health);
+    assert_eq!((found.verdict, ids(&found).len()), (Verdict::ModelAdequate, 0), "{:?}", found.data_health);
+    assert!(found.data_health.iter().any(|finding| finding.problem.contains("the robot hardly moves")));
 }
 
 /// The given example logs, where they are there.

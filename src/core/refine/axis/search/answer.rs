@@ -77,9 +77,20 @@ impl Search<'_> {
         let fit = self.fit(&[])?;
         let mut found = Vec::new();
         let residual = self.whitener.apply(&self.residual(&fit.judged.coefficients));
+        // Next to a reversal, friction that sticks depends on everything.
+        let count = |&row: &usize| if self.rows.rows[row].reverses { 0.0 } else { 1.0 };
+        let mut counts: Vec<f64> = self.whitener.rows().iter().map(count).collect();
+        if counts.iter().sum::<f64>() < 0.3 * counts.len() as f64 {
+            counts.fill(1.0);
+        }
         for (variable, columns) in leftover::groups(self.rows, wanted, self.whitener, &residual) {
             let white: Vec<Vec<f64>> = columns.iter().map(|column| self.whitener.apply(column)).collect();
-            let blocks = self.gram(&[], &white);
+            let weighted = |column: &[f64]| -> Vec<f64> {
+                column.iter().zip(&counts).map(|(value, counts)| value * counts).collect()
+            };
+            let own: Vec<Vec<f64>> = self.white_columns(&[], &white).into_iter().map(weighted).collect();
+            let views: Vec<&[f64]> = own.iter().map(Vec::as_slice).collect();
+            let blocks = Blocks::new(&views, &weighted(&self.white.target), &self.white.blocks);
             let last = blocks.target() - 1;
             let kept: Vec<usize> = independent(&blocks, &fit.members, last - white.len()..last, fit.noise);
             let mut members = fit.members.clone();
@@ -87,9 +98,11 @@ impl Search<'_> {
                 |column: usize| 3.0 * (fit.noise * blocks.rows() as f64).sqrt() / blocks.length(column);
             members
                 .extend(kept.iter().map(|&column| Member { spread: spread(column), ..Member::free(column) }));
-            if let Some(judged) = self.judge(&blocks, &self.places(&[]), &members, fit.noise) {
-                let gain = judged.gain_over(&fit.judged);
-                found.push(leftover::Dependence { variable, gain, z: judged.gain_z(&fit.judged) });
+            let base = self.judge(&blocks, &self.places(&[]), &fit.members, fit.noise);
+            let with = self.judge(&blocks, &self.places(&[]), &members, fit.noise);
+            if let (Some(base), Some(with)) = (base, with) {
+                let gain = with.gain_over(&base);
+                found.push(leftover::Dependence { variable, gain, z: with.gain_z(&base) });
             }
         }
         found.sort_by(|a, b| b.gain.total_cmp(&a.gain));

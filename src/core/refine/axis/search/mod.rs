@@ -5,7 +5,7 @@ mod shapes;
 mod steps;
 
 use crate::effects::{EffectKind, Machine};
-use crate::refine::select::{Blocks, Judged, Member};
+use crate::refine::select::{Blocks, Judged, Member, blocks_of};
 use crate::refine::whiten::Whitener;
 
 use super::candidates::{Candidate, Scales};
@@ -100,6 +100,9 @@ impl White {
         let count = whitener.rows().len();
         let row_s = rows.kernel.step_s * rows.kernel.thinning as f64;
         let blocks = ((count as f64 * row_s / BLOCK_S) as usize).clamp(BLOCKS[0], BLOCKS[1]);
+        let log = |row: &usize| rows.traces[rows.rows[*row].trace].log;
+        let log_rows: Vec<usize> =
+            whitener.rows().chunk_by(|a, b| log(a) == log(b)).map(<[usize]>::len).collect();
         let kernel = &rows.kernel;
         let noise = rows.position_noise
             * whitener.variance(|frequency| kernel.acceleration_noise(frequency), kernel.thinning);
@@ -112,7 +115,7 @@ impl White {
         Self {
             nuisances: nuisances.iter().map(|nuisance| whitener.apply(&nuisance.column)).collect(),
             target: whitener.apply(target),
-            blocks: (0..count).map(|index| index * blocks / count).collect(),
+            blocks: blocks_of(&log_rows, blocks),
             measured: whitener.apply(measured),
             acceleration,
             noise: noise.min(MOST_NOISE * power),

@@ -1,6 +1,6 @@
 //! Forward selection of effects: singles, pairs, and checks backward and on held-out rows.
 
-use crate::effects::{EffectKind, PREFERRED};
+use crate::effects::{EffectKind, KINDS, PREFERRED};
 use crate::refine::{
     Watch,
     error::RefineError,
@@ -90,8 +90,48 @@ impl Search<'_> {
         while self.picks.len() < MOST && self.step() == Some(true) {
             report(watch, 0.2 + 0.6 * self.picks.len() as f64 / MOST as f64)?;
         }
+        self.name_series_alike();
         self.check_backwards();
         Ok(())
+    }
+
+    /// Gives all harmonics the name of one kind where that explains as much as several, or more than the one that they
+    /// have: effects of one place are rarely several, and each harmonic alone hardly tells the kinds apart.
+    fn name_series_alike(&mut self) -> Option<()> {
+        let is_series = |pick: &&Candidate| pick.kind.series();
+        if self.picks.iter().filter(is_series).count() < 2 {
+            return Some(());
+        }
+        let error = |search: &Self| Some(search.fit(&[])?.judged.error());
+        let now = error(self)?;
+        let is_open = |kind: &&'static EffectKind| {
+            let on = kind.series() && kind.is_on(self.machine.kind) && !self.banned.contains(kind);
+            on && (self.rows.both_ways() || !kind.harmonics_oppose())
+        };
+        let named = |kind: &'static EffectKind| {
+            let is_own = |pick: &Candidate| pick.kind == kind;
+            let mut picks: Vec<Candidate> = Vec::new();
+            for pick in &self.picks {
+                if !pick.kind.series() || is_own(pick) {
+                    picks.push(pick.clone());
+                } else if !self.picks.iter().any(|own| is_own(own) && own.shape == pick.shape) {
+                    picks.push(self.candidate(kind, pick.shape.clone()));
+                }
+            }
+            let is_new = !self.picks.iter().any(is_own);
+            let most = if is_new { now * (1.0 - LEAST_GAIN) } else { now * (1.0 + LEAST_GAIN) };
+            Some((error(&self.with_picks(picks.clone()))?, picks)).filter(|(error, _)| *error < most)
+        };
+        let best = KINDS.into_iter().filter(is_open).filter_map(named).min_by(|a, b| a.0.total_cmp(&b.0));
+        if let Some((_, picks)) = best {
+            self.picks = picks;
+        }
+        Some(())
+    }
+
+    /// Leaves out kinds.
+    pub(in super::super) fn ban(&mut self, kinds: &[&'static EffectKind]) {
+        self.banned.extend(kinds);
     }
 
     /// The harmonics that the residual has most of, as candidates.

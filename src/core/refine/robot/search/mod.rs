@@ -1,6 +1,7 @@
 //! The regression: nuisances and chosen effects, judged by left-out blocks.
 
 mod forward;
+mod ground;
 mod pushes;
 mod rivals;
 mod screen;
@@ -12,7 +13,7 @@ use std::num::NonZeroUsize;
 use nalgebra::DMatrix;
 
 use crate::parallel;
-use crate::refine::select::{Blocks, Judged, Member};
+use crate::refine::select::{Blocks, Judged, Member, blocks_of};
 
 pub(super) use screen::Screen;
 pub(super) use selection::LEAST_Z;
@@ -91,8 +92,10 @@ impl<'a> Search<'a> {
         let rows = channels.rows();
         let seconds = rows.len() as f64 * trace.step_s();
         let blocks = ((seconds / BLOCK_S) as usize).clamp(BLOCKS[0], BLOCKS[1]);
-        let numbers = (0..rows.len()).map(|index| index * blocks / rows.len().max(1));
-        let block: Vec<usize> = numbers.clone().chain(numbers).collect();
+        let runs = trace.runs();
+        let log = |row: &usize| runs.iter().position(|run| run.rows.contains(row));
+        let log_rows: Vec<usize> = rows.chunk_by(|a, b| log(a) == log(b)).map(<[usize]>::len).collect();
+        let block = blocks_of(&log_rows, blocks).repeat(2);
         let target = channels.white(raw_target);
         Self {
             trace,
@@ -120,8 +123,10 @@ impl<'a> Search<'a> {
     }
 
     fn members(&self, picks: &[Candidate]) -> Vec<Member> {
+        let kinds = || picks.iter().map(|pick| pick.kind);
+        let nuisances = self.nuisances.iter().enumerate();
         let mut members: Vec<Member> =
-            self.nuisances.iter().enumerate().map(|(column, nuisance)| nuisance.member(column)).collect();
+            nuisances.map(|(column, nuisance)| nuisance.member(column, kinds())).collect();
         for pick in picks {
             for bounds in pick.bounds() {
                 members.push(Member { bounds, ..Member::free(members.len()) });
@@ -133,6 +138,11 @@ impl<'a> Search<'a> {
     fn price(&self, coefficients: &[f64]) -> f64 {
         let price = |(nuisance, value): (&Nuisance, &f64)| 3.0 * (value / nuisance.tolerance).powi(2);
         self.nuisances.iter().zip(coefficients).map(price).sum()
+    }
+
+    /// A column made white.
+    pub(super) fn white(&self, pair: &Pair) -> Vec<f64> {
+        self.channels.white(pair)
     }
 
     /// Picks with the places of their first coefficients.
@@ -206,7 +216,7 @@ impl<'a> Search<'a> {
         if !pick.is_fixed() {
             return false;
         }
-        let mut powers = vec![0.0; BLOCKS[1]];
+        let mut powers = vec![0.0; self.block.last().map_or(0, |last| last + 1)];
         for (value, block) in pick.white.iter().flat_map(|column| column.iter().zip(&self.block)) {
             powers[*block] += value * value;
         }

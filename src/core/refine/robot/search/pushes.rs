@@ -3,7 +3,8 @@
 use crate::effects::{Form, KINDS};
 
 use super::super::candidates::quantile;
-use super::{Candidate, Search};
+use super::selection::LEAST_IMPULSE_S;
+use super::{Candidate, Fit, Search};
 
 /// Shortest push that is looked for, s; how many octaves there are above it, and lengths in one.
 const SHORTEST_S: f64 = 0.06;
@@ -27,9 +28,21 @@ impl Window {
 }
 
 impl Search<'_> {
+    /// Whether r1 about a time adds up to what a push does: sticking that lets go looks like less.
+    pub(in crate::refine::robot) fn is_push(&self, at_s: f64, seconds: f64, fit: &Fit) -> bool {
+        let left = self.left_raw(&self.picks, &fit.judged.coefficients);
+        let times_s = self.trace.variable(|m| m.time_s);
+        let near = |row: &&usize| (at_s - seconds..at_s + 2.0 * seconds).contains(&times_s[**row]);
+        let impulse: f64 = self.channels.rows().iter().filter(near).map(|&row| left[0][row]).sum();
+        impulse.abs() * self.trace.step_s() >= LEAST_IMPULSE_S * self.trace.machine.weight_n()
+    }
+
     /// Moments at which the robot may have been pushed: of each octave of lengths the window in which a constant says
     /// most of r1.
     pub(super) fn pushes(&self, picks: &[Candidate], coefficients: &[f64]) -> Vec<Candidate> {
+        if !self.trace.moves() {
+            return Vec::new();
+        }
         let left = self.left_raw(picks, coefficients);
         let rows = self.channels.rows();
         let own: Vec<f64> = rows.iter().map(|&row| left[0][row]).collect();

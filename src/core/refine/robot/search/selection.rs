@@ -20,9 +20,9 @@ const OF_A_SHAPE: f64 = 2.0;
 /// Standard errors above 0 of an effect's size, by the jackknife over blocks, and those of one that explains less than
 /// the least of a hundred.
 pub(in crate::refine::robot) const LEAST_Z: f64 = 3.0;
-const SURE_Z: f64 = 6.0;
+const SURE_Z: f64 = 5.0;
 /// Least impulse of a push as a share of the weight, s: sticking that lets go looks like a smaller one.
-const LEAST_IMPULSE_S: f64 = 0.0025;
+pub(super) const LEAST_IMPULSE_S: f64 = 0.0025;
 /// Time within which pushes are one, s, and the share of their gain that the strongest must have alone.
 const ONE_PUSH_S: f64 = 1.5;
 const MOST_OF_A_PUSH: f64 = 0.9;
@@ -37,7 +37,8 @@ const HANDICAP: [f64; 2] = [3.0, 10.0];
 /// Gain in units of the least one up to which clean robots are asked what chance does.
 const DOUBT: f64 = 3.0;
 
-/// Share of the power that effects explain of which their sizes and shapes, right to a few percent, may leave as much.
+/// Fraction of the power that effects explain of which their sizes and shapes, right to a few percent, may leave as much;
+/// as many times more for what is mistaken for much or has several shapes that fit themselves to it.
 const LEFT_OF_FOUND: f64 = 1e-3;
 
 /// What a candidate costs against a rival that does as well.
@@ -149,8 +150,11 @@ impl Search<'_> {
                 && unseen(&self.picks, &with) >= unseen(&others, &without);
             let held_out = |picks: &[Candidate], fit: &Fit| held_out_error(self, picks, fit).powi(2);
             let [held_without, held_with] = [held_out(&others, &without), held_out(&self.picks, &with)];
-            let gains_little = held_without - held_with <= LEFT_OF_FOUND * (held_bare - held_with).max(0.0);
-            let is_left = gain < LEFT_OF_FOUND * (bare.score - with.score);
+            let shapes = pick.kind.shapes().filter(|parameter| parameter.step != Step::Fixed).count();
+            let freedom = if shapes > 1 { 2.0 * shapes as f64 } else { 1.0 };
+            let left = LEFT_OF_FOUND * pick.kind.trial.caution.max(freedom);
+            let gains_little = held_without - held_with <= left * (held_bare - held_with).max(0.0);
+            let is_left = gain < left * (bare.score - with.score);
             if is_left || self.is_stuck(&pick, &others) || !pick.kind.trial.brief && (is_weak || gains_little)
             {
                 self.picks = others;
@@ -160,11 +164,12 @@ impl Search<'_> {
         }
     }
 
-    /// Whether a pick whose size is in its shape stays at its bound without every block: the shape never came to where
-    /// the log has it.
+    /// Whether the shape of a pick never came to where the log has it: it is at the end of its range, or its size, which
+    /// is in the shape, stays at its bound without every block.
     fn is_stuck(&self, pick: &Candidate, others: &[Candidate]) -> bool {
         let picks = [others, std::slice::from_ref(pick)].concat();
-        pick.is_sized() && self.fit(&picks).is_some_and(|fit| self.z(pick, &fit).is_infinite())
+        pick.is_at_an_end()
+            || pick.is_sized() && self.fit(&picks).is_some_and(|fit| self.z(pick, &fit).is_infinite())
     }
 
     /// Of pushes next to each other keeps the strongest where the others only mend its shape, and none where one push
@@ -260,7 +265,10 @@ impl Search<'_> {
 
     /// Candidates by what they would gain as they are; of one that is flexible only its best shape.
     fn short_list(&self, screen: &Screen, picks: &[Candidate], now: &Fit) -> Vec<(f64, Candidate)> {
-        let pushes = self.pushes(picks, &now.judged.coefficients);
+        let found = [
+            self.pushes(picks, &now.judged.coefficients),
+            self.ground_waves(picks, &now.judged.coefficients),
+        ];
         let wanted = |candidate: &&Candidate| {
             candidate.repeats()
                 && !picks.iter().any(|pick| pick.kind == candidate.kind && pick.shape == candidate.shape)
@@ -269,7 +277,7 @@ impl Search<'_> {
         let mut gains: Vec<(f64, &Candidate)> = self
             .library
             .iter()
-            .chain(&pushes)
+            .chain(found.iter().flatten())
             .filter(wanted)
             .map(|candidate| (screen.gain(candidate), candidate))
             .filter(|(gain, _)| *gain > LEAST_LOOK)

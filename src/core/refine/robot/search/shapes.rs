@@ -151,6 +151,9 @@ impl Search<'_> {
             return None;
         }
         let mut moved = Candidate::new(self.trace, candidate.kind, candidate.form, shape);
+        if !moved.is_resolved(self.trace.row_s()) {
+            return None;
+        }
         moved.white = moved.pairs.iter().map(|pair| self.channels.white(pair)).collect();
         Some(moved)
     }
