@@ -145,6 +145,26 @@ fn a_run_that_fails_has_its_end_line_too() {
 }
 
 #[test]
+fn a_run_that_is_refused_leaves_no_recording() {
+    let csv = recording("drive-refused.csv");
+    let model = csv.with_extension("toml");
+    let paper = fs::read_to_string("presets/paper.toml").unwrap();
+    let without: String =
+        paper.lines().filter(|line| !line.starts_with("torque_nm")).map(|line| format!("{line}\n")).collect();
+    assert_ne!(without.len(), paper.len());
+    fs::write(&model, without).unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_flqr"))
+        .args(["drive", "emulated"])
+        .args([&model, Path::new("--record"), &csv])
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    for ending in ["csv", "log"] {
+        assert!(!csv.with_extension(ending).exists(), "{}", String::from_utf8_lossy(&output.stderr));
+    }
+}
+
+#[test]
 fn a_recording_that_ends_early_is_a_problem_of_the_run() {
     let csv = recording("drive-cut.csv");
     let model = patient_model(&csv);
@@ -160,7 +180,7 @@ fn a_recording_that_ends_early_is_a_problem_of_the_run() {
     assert_eq!(output.status.code(), Some(1));
     let end = end(&output);
     let problem = end["problem"].as_str().unwrap();
-    assert!(problem.contains("the recording has stopped") && problem.contains("rows were lost"), "{end}");
+    assert!(problem.contains("the recording has stopped") && problem.contains("were lost"), "{end}");
     assert!(end["recording"]["rows_lost"].as_u64().unwrap() > 0 && end["motors_off"] == true, "{end}");
     assert_eq!(String::from_utf8(output.stderr).unwrap(), format!("flqr: {problem}\n"));
 }

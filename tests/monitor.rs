@@ -113,6 +113,32 @@ fn a_reader_that_takes_no_line_does_not_keep_the_monitor_from_ending() {
 
 #[cfg(unix)]
 #[test]
+fn a_recording_that_the_end_of_its_reader_cuts_is_a_problem_of_the_run() {
+    for ending in ["csv", "log"] {
+        let _absent = std::fs::remove_file(path("monitor-closed").with_extension(ending));
+    }
+    let run = |record: &[&str]| {
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        let program = Command::new(env!("CARGO_BIN_EXE_flqr"))
+            .args(["monitor", "emulated", "--json", "--seconds", "5"])
+            .args(record)
+            .stdout(writer)
+            .stderr(std::process::Stdio::piped())
+            .spawn()
+            .unwrap();
+        let output = program.wait_with_output().unwrap();
+        (output.status.code(), String::from_utf8(output.stderr).unwrap())
+    };
+    assert_eq!(run(&[]), (Some(0), String::new()));
+    let (code, message) = run(&["--record", &path("monitor-closed.csv").display().to_string()]);
+    let told =
+        message.contains("monitor-closed.csv: standard output was closed, which ended the recording at ");
+    assert!(code == Some(1) && told, "{code:?}: {message}");
+}
+
+#[cfg(unix)]
+#[test]
 fn a_recording_that_ends_early_is_a_problem_of_the_run() {
     for ending in ["csv", "log"] {
         let _absent = std::fs::remove_file(path("monitor-cut").with_extension(ending));
@@ -128,7 +154,7 @@ fn a_recording_that_ends_early_is_a_problem_of_the_run() {
     let text = String::from_utf8(output.stdout).unwrap();
     let lines: Vec<Value> = text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect();
     let [end] = of_type(&lines, "end")[..] else { panic!("{text}") };
-    assert!(end["problem"].as_str().unwrap().contains("rows were lost"), "{end}");
+    assert!(end["problem"].as_str().unwrap().contains("were lost"), "{end}");
     assert!(end["recording"]["rows_lost"].as_u64().unwrap() > 0, "{end}");
 }
 

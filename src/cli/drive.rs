@@ -177,7 +177,7 @@ impl Dialogue<'_> {
                     self.lines.update(&update)?;
                     *last = Some(update.status);
                 }
-                None if is_over => return Err(Failure::Message(died())),
+                None if is_over => return Err(died()),
                 None => {}
             }
             if let Some(end) = self.go_on(last.as_ref(), session)? {
@@ -248,12 +248,14 @@ impl Dialogue<'_> {
         ending: Option<Ending>,
     ) -> Result<(), Failure> {
         let mut problems: Vec<String> = Vec::new();
-        let mut is_defect = false;
+        let (mut is_defect, mut is_unread) = (false, false);
         let end = match held {
             Ok(end) => Some(end),
-            Err(Failure::ReaderGone) if self.driven_since.is_none() => return Err(Failure::ReaderGone),
             Err(Failure::ReaderGone) => {
-                problems.push("the robot was stopped: standard output was closed".to_owned());
+                is_unread = true;
+                if self.driven_since.is_some() {
+                    problems.push("the robot was stopped: standard output was closed".to_owned());
+                }
                 None
             }
             Err(Failure::Defect(problem)) => {
@@ -294,8 +296,11 @@ impl Dialogue<'_> {
         problems.extend(recording.as_ref().and_then(|recording| recording.problem.clone()));
         let problem = (!problems.is_empty()).then(|| problems.join("; "));
         let outcome = Outcome { problem: problem.clone(), signal, motors_off: Some(motors_off), recording };
-        let printed =
-            self.lines.end(time, end.as_ref(), outcome).and_then(|()| self.lines.finish(self.interrupt));
+        let printed = if is_unread {
+            Err(Failure::ReaderGone)
+        } else {
+            self.lines.end(time, end.as_ref(), outcome).and_then(|()| self.lines.finish(self.interrupt))
+        };
         match problem {
             None => printed,
             Some(problem) if is_defect => Err(Failure::Defect(problem)),

@@ -94,8 +94,8 @@ mod system {
     use std::thread::Builder;
 
     use signal_hook::consts::signal::{
-        SIGALRM, SIGHUP, SIGINT, SIGPROF, SIGQUIT, SIGTERM, SIGTSTP, SIGTTIN, SIGTTOU, SIGUSR1, SIGUSR2,
-        SIGVTALRM, SIGXCPU, SIGXFSZ,
+        SIGALRM, SIGHUP, SIGINT, SIGIO, SIGPROF, SIGQUIT, SIGSYS, SIGTERM, SIGTRAP, SIGTSTP, SIGTTIN,
+        SIGTTOU, SIGUSR1, SIGUSR2, SIGVTALRM, SIGXCPU, SIGXFSZ,
     };
     use signal_hook::iterator::Signals;
     use signal_hook::low_level::{emulate_default_handler, signal_name};
@@ -107,13 +107,20 @@ mod system {
     /// Signals that request termination.
     const END: [i32; 4] = [SIGINT, SIGTERM, SIGHUP, SIGQUIT];
     /// Further signals that would end it immediately.
-    const KILL: [i32; 7] = [SIGUSR1, SIGUSR2, SIGXFSZ, SIGXCPU, SIGALRM, SIGVTALRM, SIGPROF];
+    const KILL: [i32; 10] =
+        [SIGUSR1, SIGUSR2, SIGXFSZ, SIGXCPU, SIGALRM, SIGVTALRM, SIGPROF, SIGIO, SIGSYS, SIGTRAP];
+    /// Those of Linux alone that have no name here: SIGSTKFLT, SIGPWR and the real-time signals (signal(7)).
+    const UNNAMED: [std::ops::RangeInclusive<i32>; 3] = [16..=16, 30..=30, 34..=64];
 
     pub(super) fn watch(duty: Duty, interrupt: Interrupt) -> io::Result<()> {
         // A monitor may be suspended at any time. A file that has grown to its limit ends its recording, not itself.
         let kinds =
             if duty == Duty::Monitor { vec![&END[..], &[SIGXFSZ]] } else { vec![&SUSPEND[..], &END, &KILL] };
-        let mut signals = Signals::new(kinds.concat())?;
+        let mut numbers = kinds.concat();
+        if duty != Duty::Monitor && cfg!(target_os = "linux") {
+            numbers.extend(UNNAMED.into_iter().flatten());
+        }
+        let mut signals = Signals::new(numbers)?;
         let work = move || {
             flqr_core::device::hurry();
             for signal in signals.forever() {
@@ -140,9 +147,11 @@ mod system {
         }
     }
 
-    /// Applies the default action of a signal. A failure cannot be handled.
+    /// Applies the default action of a signal, which for those without a name is to end the program.
     fn emulate(signal: i32) {
-        emulate_default_handler(signal).unwrap_or(());
+        if emulate_default_handler(signal).is_err() {
+            std::process::exit(128 + signal);
+        }
     }
 
     pub(super) fn name(signal: i32) -> &'static str {

@@ -88,35 +88,64 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let mut lines = if is_replay { Lines::patient(output, &interrupt)? } else { Lines::start(output)? };
     let mut time = Duration::ZERO;
     let end = arguments.seconds.map_or(Duration::MAX, Duration::from_secs_f64);
-    let reason = loop {
-        if interrupt.came() {
-            break Some(End::Interrupt);
+    let watched = watch(&mut session, &mut lines, &mut time, |time| match () {
+        () if interrupt.came() => Some(End::Interrupt),
+        () if time >= end => Some(End::Time),
+        () => None,
+    });
+    let recording = session.close().and_then(|ending| ending.recording);
+    let mut problem = recording.as_ref().and_then(|recording| recording.problem.clone());
+    let reason = match watched {
+        Ok(reason) => Some(reason),
+        Err(Failure::ReaderGone) => {
+            let cut = recording.map(|recording| {
+                let file = recording.file.display();
+                format!(
+                    "{file}: standard output was closed, which ended the recording at {:.1} s",
+                    time.as_secs_f64()
+                )
+            });
+            return Err(problem.or(cut).map_or(Failure::ReaderGone, Failure::Message));
         }
-        if time >= end {
-            break Some(End::Time);
+        Err(Failure::Defect(defect)) => {
+            problem = Some(defect);
+            None
+        }
+        Err(failure) => return Err(failure),
+    };
+    let outcome =
+        Outcome { problem: problem.clone(), signal: interrupt.signal(), motors_off: None, recording };
+    let printed = lines.end(time, reason.as_ref(), outcome).and_then(|()| lines.finish(&interrupt));
+    match problem {
+        None => printed,
+        Some(defect) if reason.is_none() => Err(Failure::Defect(defect)),
+        Some(problem) => Err(Failure::Message(problem)),
+    }
+}
+
+/// Prints updates until `end` gives a reason to end, or the recording that is replayed does.
+fn watch(
+    session: &mut Session,
+    lines: &mut Lines<'_>,
+    time: &mut Duration,
+    end: impl Fn(Duration) -> Option<End>,
+) -> Result<End, Failure> {
+    loop {
+        if let Some(end) = end(*time) {
+            return Ok(end);
         }
         // Asked before, so that the last updates of a thread that has ended are read.
         let is_over = session.has_died();
-        let Some(update) = session.wait(Duration::from_millis(100)) else {
-            if is_over {
-                break None;
+        match session.wait(Duration::from_millis(100)) {
+            Some(update) => {
+                *time = update.status.time;
+                lines.update(&update)?;
+                if update.status.connection == Connection::Ended {
+                    return Ok(End::Recording);
+                }
             }
-            continue;
-        };
-        time = update.status.time;
-        lines.update(&update)?;
-        if update.status.connection == Connection::Ended {
-            break Some(End::Recording);
+            None if is_over => return Err(died()),
+            None => {}
         }
-    };
-    let recording = session.close().and_then(|ending| ending.recording);
-    let problem = match reason {
-        None => Some(died()),
-        Some(_) => recording.as_ref().and_then(|recording| recording.problem.clone()),
-    };
-    let signal = interrupt.signal();
-    let outcome = Outcome { problem: problem.clone(), signal, motors_off: None, recording };
-    lines.end(time, reason.as_ref(), outcome)?;
-    lines.finish(&interrupt)?;
-    problem.map_or(Ok(()), |problem| Err(Failure::Message(problem)))
+    }
 }

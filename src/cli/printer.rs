@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::thread::{Builder, JoinHandle, sleep};
 use std::time::{Duration, Instant};
 
@@ -12,6 +12,8 @@ use super::output::Failure;
 
 /// Queue length above which optional lines are dropped.
 const MOST_WAITING: usize = 256;
+/// Queue length above which lines are dropped that must not be lost: hours of events that nobody reads.
+const MOST_KEPT: usize = 1 << 16;
 /// Polling interval of the reader.
 const LOOK: Duration = Duration::from_millis(2);
 /// Timeout after an interrupt for a reader that reads no line.
@@ -20,7 +22,7 @@ const PATIENCE: Duration = Duration::from_millis(500);
 /// Prints lines in their order.
 pub(super) struct Printer {
     /// `None` after the last line.
-    lines: Option<Sender<Vec<u8>>>,
+    lines: Option<SyncSender<Vec<u8>>>,
     /// Number of lines not printed yet.
     waiting: Arc<AtomicUsize>,
     dropped: u64,
@@ -31,7 +33,7 @@ pub(super) struct Printer {
 impl Printer {
     /// Starts the thread.
     pub(super) fn start(out: impl Write + Send + 'static) -> Result<Self, Failure> {
-        let (sender, lines) = channel();
+        let (sender, lines) = sync_channel(MOST_KEPT);
         let waiting = Arc::new(AtomicUsize::new(0));
         let left = Arc::clone(&waiting);
         let thread = Builder::new().name("output".to_owned()).spawn(move || print(out, &lines, &left))?;
@@ -41,9 +43,14 @@ impl Printer {
     /// Queues a line that must not be lost.
     pub(super) fn keep(&mut self, line: Vec<u8>) -> Result<(), Failure> {
         self.waiting.fetch_add(1, Ordering::Relaxed);
-        match self.lines.as_ref().map(|lines| lines.send(line)) {
+        match self.lines.as_ref().map(|lines| lines.try_send(line)) {
             Some(Ok(())) => Ok(()),
-            None | Some(Err(_)) => self.join(),
+            Some(Err(TrySendError::Full(_))) => {
+                self.waiting.fetch_sub(1, Ordering::Relaxed);
+                self.dropped += 1;
+                Ok(())
+            }
+            None | Some(Err(TrySendError::Disconnected(_))) => self.join(),
         }
     }
 

@@ -19,11 +19,10 @@ const JSON_INTERVAL: Duration = Duration::from_millis(100);
 /// Time between two lines of text.
 const TEXT_INTERVAL: Duration = Duration::from_secs(1);
 
-/// Message for a session thread that has ended unexpectedly.
-pub(super) fn died() -> String {
-    "the session thread has ended unexpectedly, an internal error: make sure that the motors are off, \
-     and report it"
-        .to_owned()
+/// A session thread that has ended unexpectedly.
+pub(super) fn died() -> Failure {
+    let text = "the session thread has ended unexpectedly, an internal error: make sure that the motors are off, and report it";
+    Failure::Defect(text.to_owned())
 }
 
 /// Prints updates.

@@ -142,9 +142,8 @@ class Program:
         model = folder / "model.toml"
         model.write_text(PAPER.read_text() + scenario.model)
         self.recording = folder / ("disk" if scenario.disk_kib else "") / "run.csv"
-        for ending in (".csv", ".log"):
-            file = self.recording.with_suffix(ending)
-            file.unlink(missing_ok=True)
+        for file in self.recording.parent.glob("run.*"):
+            file.unlink()
         command = [flqr, scenario.command, names["can"], "--imu", names["imu"], "--json"]
         command += ["--record", str(self.recording)]
         if scenario.command == "drive":
@@ -341,7 +340,7 @@ def disturbance_of(scenario, result):
     late = result.robot["worst_lateness_s"]
     if late > LATENESS_S:
         return f"the emulated robot itself was late by {1000 * late:.0f} ms"
-    if scenario.has_fault() and result.was_early:
+    if scenario.has_fault() and result.was_early and result.stopped_by in BUSY_STOPS:
         return f"stopped before the fault: {result.end.get('text')}"
     if result.stopped_by in BUSY_STOPS and not scenario.busy and not scenario.breaks_the_link():
         return f"stopped for another reason than the fault: {result.end.get('text')}"
@@ -428,7 +427,7 @@ def main():
         return 0
     print(LEGEND)
     print(line([name for name, _ in COLUMNS]))
-    failures = []
+    failures, skipped = [], []
     for scenario in chosen:
         folder = options.out / re.sub(r"[^a-z0-9]+", "-", scenario.name.lower())
         for _ in range(ATTEMPTS):
@@ -436,6 +435,7 @@ def main():
                 result = run(scenario, options.flqr, folder)
             except subprocess.CalledProcessError as error:
                 print(f"{scenario.name}: skipped: {error}", flush=True)
+                skipped.append(scenario.name)
                 result = None
                 break
             print(row(scenario, result), flush=True)
@@ -446,7 +446,8 @@ def main():
         for problem in filter(None, (result and expectation(result) for expectation in scenario.expect)):
             failures.append(f"{scenario.point}, {scenario.name}: {problem}")
             print(f"    FAILED: {problem}", flush=True)
-    print(f"\n{len(chosen)} scenarios, {len(failures)} expectations failed")
+    without = f", without {', '.join(skipped)}" if skipped else ""
+    print(f"\n{len(chosen)} scenarios{without}, {len(failures)} expectations failed")
     return 1 if failures else 0
 
 

@@ -173,7 +173,7 @@ fn check_gain(gain: &Matrix2x4<f64>) -> Result<(), ControlError> {
     Ok(())
 }
 
-/// Returns the feedforward of friction and effects of both motors.
+/// Feedforward of friction and effects of both motors.
 type Fed = ([Option<Feedforward>; 2], Option<Arc<EffectFeedforward>>);
 
 fn feedforward(robot: &RobotModel) -> Result<Fed, ControlError> {

@@ -7,6 +7,7 @@ use nalgebra::Matrix2x4;
 use super::Reference;
 use super::balance::{BalanceController, ControllerKind};
 use super::odometry::Measurement;
+use super::yaw::yaw_inertia_kg_m2;
 use crate::lqr::{Margins, SampledLoop, margins, sampled_poles};
 use crate::model::{RobotModel, State};
 
@@ -109,6 +110,18 @@ pub enum Refusal {
         /// Time constant, s.
         seconds: f64,
     },
+    /// The yaw hold rings or is unstable.
+    #[error(
+        "the yaw hold has a phase margin of {:.0}° and a delay margin of {:.1} ms, at least 20° and 2 ms are required: lower \
+         stiffness_nm_rad or raise damping_nm_s_rad in [yaw_hold], or lower both",
+        phase_rad.to_degrees(), 1e3 * delay_s
+    )]
+    YawHold {
+        /// Phase margin, rad; below 0 where the loop is unstable.
+        phase_rad: f64,
+        /// Delay margin, s.
+        delay_s: f64,
+    },
     /// The feedforward exceeds that of the robot's own model.
     #[error(
         "the feedforward exceeds that of the model used for the connection by {excess_nm:.2} N m, at most \
@@ -176,8 +189,36 @@ pub fn check(robot: &RobotModel, controller: &BalanceController) -> Result<(), R
         }
         () if phase_rad < LEAST_PHASE_MARGIN_RAD => Err(Refusal::PhaseMargin { phase_rad }),
         () if delay_s < LEAST_DELAY_MARGIN_S => Err(Refusal::DelayMargin { delay_s }),
-        () => check_decay(robot, controller, &timing).and_then(|()| check_feedforward(robot, controller)),
+        () => check_decay(robot, controller, &timing)
+            .and_then(|()| check_yaw_hold(robot, controller, &timing))
+            .and_then(|()| check_feedforward(robot, controller)),
     }
+}
+
+/// Checks the loop of the heading, whose gain falls steadily with frequency: b (k + d s)/s² with the torque held for a
+/// tick, and b the angular acceleration about the vertical by a torque in opposite senses.
+fn check_yaw_hold(
+    robot: &RobotModel,
+    controller: &BalanceController,
+    timing: &SampledLoop,
+) -> Result<(), Refusal> {
+    let (parameters, chassis) = (&robot.parameters, &robot.chassis);
+    let response =
+        chassis.track_width_m / (parameters.wheel_radius_m * yaw_inertia_kg_m2(parameters, chassis));
+    let stiffness = response * controller.yaw_hold.stiffness_nm_rad;
+    let damping = response * controller.yaw_hold.damping_nm_s_rad;
+    // |L| = 1: ω⁴ = k² + d² ω².
+    let half = 0.5 * damping * damping;
+    let crossover_rad_s = (half + half.hypot(stiffness)).sqrt();
+    if crossover_rad_s == 0.0 {
+        return Ok(());
+    }
+    let lag_s = timing.delay_s + 0.5 * timing.tick_s;
+    let phase_rad = libm::atan2(damping * crossover_rad_s, stiffness) - crossover_rad_s * lag_s;
+    let delay_s = phase_rad / crossover_rad_s;
+    // Not finite is not enough either.
+    let is_enough = phase_rad >= LEAST_PHASE_MARGIN_RAD && delay_s >= LEAST_DELAY_MARGIN_S;
+    if is_enough { Ok(()) } else { Err(Refusal::YawHold { phase_rad, delay_s }) }
 }
 
 fn check_decay(

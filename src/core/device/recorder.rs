@@ -144,7 +144,7 @@ impl Recorder {
         self.input.shared.lost().iter().sum()
     }
 
-    /// Writes all that was handed over, and ends. Rows that the disk was too slow for are a problem too.
+    /// Writes all that was handed over, and ends. What the disk was too slow for is a problem too.
     pub fn finish(mut self) -> RecordingStatus {
         self.join();
         self.input.shared.final_status()
@@ -236,13 +236,25 @@ impl Shared {
 
     fn final_status(&self) -> RecordingStatus {
         let mut status = self.status().clone();
-        status.rows_lost = self.lost()[ROWS];
+        let lost = self.lost();
+        status.rows_lost = lost[ROWS];
         let file = status.file.display();
-        let lost = match status.rows_lost {
-            0 => return status,
-            1 => "1 row was lost".to_owned(),
-            count => format!("{count} rows were lost"),
-        };
+        let counts = [(ROWS, "row"), (FRAMES, "frame"), (OTHERS, "bench row or event")];
+        let parts: Vec<String> = { counts.into_iter() }
+            .filter(|(kind, _)| lost[*kind] > 0)
+            .map(|(kind, name)| match lost[kind] {
+                1 => format!("1 {name}"),
+                count => format!(
+                    "{count} {}",
+                    name.replace("row", "rows").replace("frame", "frames").replace("event", "events")
+                ),
+            })
+            .collect();
+        if parts.is_empty() {
+            return status;
+        }
+        let verb = if lost.iter().sum::<u64>() == 1 { "was" } else { "were" };
+        let lost = format!("{} {verb} lost", parts.join(" and "));
         status.problem = Some(match status.problem {
             Some(problem) => format!("{problem}; {lost}"),
             None => format!("{file}: {lost}, because the disk was too slow: record to another one"),

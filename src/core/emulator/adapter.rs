@@ -164,7 +164,7 @@ mod tests {
     use crate::emulator::EmulatorSettings;
     use crate::model_file::presets;
 
-    /// Returns the responses of the adapter, line by line, at a time in ms.
+    /// Responses of the adapter, line by line, at a time in ms.
     struct Line {
         adapter: EmulatedAdapter,
         robot: Emulator,

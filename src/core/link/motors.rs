@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use crate::model::Motor;
 
-/// What is required of both motors.
+/// Order to both motors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MotorOrder {
     /// Put power on.

@@ -82,6 +82,8 @@ struct Unanswered {
 struct Sent {
     bytes: [u8; 8],
     time: Duration,
+    /// Whether `time` is that of its way to the bus, and not of the order.
+    written: bool,
 }
 
 /// Encoder steps in the motor's own sense.
@@ -164,6 +166,28 @@ impl Wheels {
     /// which replies to expect, and are no events themselves.
     pub fn receive(&mut self, frame: &StampedFrame) -> impl Iterator<Item = MotorEvent> + use<> {
         self.heard(frame).unwrap_or_default().into_iter().flatten()
+    }
+
+    /// Takes the time at which a frame, handed to [`Wheels::receive`] when it was ordered, was written to the bus. One
+    /// that nobody ordered is taken for sent now.
+    pub fn written(&mut self, stamped: &StampedFrame) {
+        let Some((address, bytes)) = lk::address(&stamped.frame) else { return };
+        match address {
+            Address::CommandOrReply(id) | Address::Reply(id) => {
+                if let Some(wheel) = self.wheels.iter_mut().find(|wheel| wheel.id == Some(id)) {
+                    wheel.written(bytes, stamped.time, &self.settings);
+                }
+            }
+            Address::Torques => {
+                let slots = lk::torques(bytes);
+                for wheel in &mut self.wheels {
+                    let slot = wheel.id.and_then(|id| slots.get(usize::from(id.number()) - 1));
+                    if let Some(&iq) = slot {
+                        wheel.written(Command::TorqueCurrent { iq }.encode(), stamped.time, &self.settings);
+                    }
+                }
+            }
+        }
     }
 
     fn heard(&mut self, stamped: &StampedFrame) -> Option<[Option<MotorEvent>; 2]> {
@@ -260,6 +284,17 @@ impl Wheel {
         })
     }
 
+    fn written(&mut self, bytes: [u8; 8], time: Duration, settings: &LinkSettings) {
+        let Some(sent) = self.sent.iter_mut().find(|sent| !sent.written && sent.bytes == bytes) else {
+            self.commanded(bytes, u16::from(bytes[0]), time, true, settings);
+            return;
+        };
+        (sent.time, sent.written) = (time, true);
+        if let Some(asked) = self.unanswered.iter_mut().find(|asked| asked.code == bytes[0] && asked.ours) {
+            asked.time = asked.time.max(time);
+        }
+    }
+
     fn commanded(
         &mut self,
         bytes: [u8; 8],
@@ -275,7 +310,7 @@ impl Wheel {
             if self.sent.len() == MOST_SENT {
                 self.sent.pop_front();
             }
-            self.sent.push_back(Sent { bytes, time });
+            self.sent.push_back(Sent { bytes, time, written: false });
         }
         let current_a = match Command::decode(bytes)? {
             Command::TorqueCurrent { iq } => Some(self.current_a(iq, settings)),

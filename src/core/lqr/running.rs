@@ -74,12 +74,12 @@ pub struct SampledResponse {
     pub tick_s: f64,
     /// True state at every tick, the initial one first.
     pub states: Vec<State>,
-    /// Torque that is required of the left and the right motor at every tick, N m; it acts a delay later.
+    /// Torque commanded of the left and the right motor at every tick, N m; it acts a delay later.
     pub torque_nm: Vec<[f64; 2]>,
 }
 
 impl SampledResponse {
-    /// Largest torque that is required of either motor, N m.
+    /// Largest torque commanded of either motor, N m.
     pub fn peak_torque_nm(&self) -> f64 {
         self.torque_nm.iter().flatten().fold(0.0, |peak: f64, torque| peak.max(torque.abs()))
     }

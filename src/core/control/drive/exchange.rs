@@ -30,7 +30,7 @@ impl Default for DriveSettings {
 /// A robot that cannot be driven.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum DriveError {
-    /// Torques cannot be determined as currents.
+    /// The torque per ampere is unknown.
     #[error(
         "the robot can be monitored but not driven: set torque_constant_nm_a in [link], 0.32 N m/A of the MF9025v2-16T \
          or 0.81 N m/A of the -35T"

@@ -129,7 +129,7 @@ impl Drive {
             slew_nm: robot.limits.torque_slew_nm_s.map_or(f64::INFINITY, |slew| slew * TICK_S),
             stage: Stage::Listening,
             watch: Watch::new(),
-            wheels: WheelWatch::new(robot),
+            wheels: WheelWatch::new(robot, program.balances()),
             gravity: GravityWatch::new(robot.parameters.gravity_m_s2, robot.parameters.com_height_m),
             estimator: Estimator::new(robot),
             checks: Checks::new(program.balances(), Duration::ZERO),
@@ -165,7 +165,7 @@ impl Drive {
         self.stage == Stage::Listening || matches!(self.stage, Stage::Stopped(_)) && self.switching.is_none()
     }
 
-    /// Largest torque that is required of a motor, N m.
+    /// Returns the largest torque commanded of a motor, N m.
     pub fn torque_limit_nm(&self) -> f64 {
         self.torque_limit_nm
     }
@@ -193,7 +193,11 @@ impl Drive {
 
     fn obey(&mut self, now: Duration, order: &DriveOrder, output: &mut Output) {
         match (order, self.stage) {
-            (DriveOrder::Stop | DriveOrder::Finish, Stage::Stopped(_)) => {}
+            // Motors that still roll out are switched off.
+            (DriveOrder::Stop, Stage::Stopped(_)) => {
+                self.switching.as_mut().into_iter().for_each(Switching::has_rolled_out);
+            }
+            (DriveOrder::Finish, Stage::Stopped(_)) => {}
             (DriveOrder::Stop, _) => self.stop(now, StopReason::Requested, output),
             (DriveOrder::Finish, _) => self.stop(now, StopReason::TimeOver, output),
             (DriveOrder::Check, Stage::Listening) => self.begin_checks(now, output),
@@ -365,10 +369,13 @@ impl Drive {
         }
     }
 
-    /// Hands the newest readings to the watches that compare sensors with each other, on the ground.
+    /// Hands the newest readings to the watches that compare sensors with each other.
     fn compare_sensors(&mut self, state: &State, acted_nm: [f64; 2]) {
         let [Some(left), Some(right)] = self.watch.states() else { return };
-        let Some(imu) = self.watch.imu.last.filter(|_| self.program.balances()) else { return };
+        if !self.program.balances() {
+            return self.wheels.hear_in_air(&[left, right], acted_nm, &self.robot.safety);
+        }
+        let Some(imu) = self.watch.imu.last else { return };
         self.wheels.hear(&[left, right], &imu, acted_nm, &self.robot.safety);
         self.gravity.hear(&imu, state);
     }
@@ -398,10 +405,10 @@ impl Drive {
             .or_else(|| self.never_on(now))
             .or_else(|| self.watch.imu.frozen(now, limits, balances))
             .or_else(|| self.watch.imu.inconsistent(limits))
+            .or_else(|| self.wheels.problem(limits))
             .or_else(|| {
                 if balances {
                     watch::out_of_bounds(state, limits)
-                        .or_else(|| self.wheels.problem(limits))
                         .or_else(|| self.wheels.too_fast(limits))
                         .or_else(|| self.gravity.problem(limits))
                 } else {

@@ -12,7 +12,7 @@ use crate::model::Motor;
 pub enum Stage {
     /// Nothing is sent.
     Listening,
-    /// Motors are requested readings, without torque, and all that has to be right is checked.
+    /// Motors are queried, without torque, and everything that must be right is checked.
     Checking,
     /// The motors are on and follow the controller.
     Driving,
@@ -32,7 +32,7 @@ impl Stage {
     }
 }
 
-/// What is required of the drive.
+/// Order to the drive.
 #[derive(Clone, Debug, PartialEq)]
 pub enum DriveOrder {
     /// First step of arming: from listening to checking.
@@ -147,7 +147,8 @@ pub enum StopReason {
     },
     /// A motor is off that is to be on.
     #[error(
-        "the {motor} motor is off: it has switched itself off, or has not accepted the command to switch on"
+        "the {motor} motor is off: it has switched itself off, or has not accepted the command to switch on: check its supply and \
+         read its errors"
     )]
     MotorOff {
         /// Which.
@@ -168,25 +169,29 @@ pub enum StopReason {
         voltage_v: f64,
     },
     /// Tilted too far.
-    #[error("the robot tilts by {pitch_rad:.3} rad")]
+    #[error(
+        "the robot tilts by {pitch_rad:.3} rad: set it upright, and check the signs of IMU and motors if it fell at once"
+    )]
     Tilt {
         /// Pitch, rad.
         pitch_rad: f64,
     },
     /// Too fast.
-    #[error("the robot moves at {x_dot_m_s:.2} m/s")]
+    #[error("the robot moves at {x_dot_m_s:.2} m/s: put it back, or raise speed_m_s in [safety]")]
     Speed {
         /// Speed, m/s.
         x_dot_m_s: f64,
     },
     /// Too far away.
-    #[error("the robot is {x_m:.2} m from where it was armed")]
+    #[error("the robot is {x_m:.2} m from where it was armed: put it back, or raise distance_m in [safety]")]
     Distance {
         /// Way, m.
         x_m: f64,
     },
     /// A wheel turns too fast.
-    #[error("the {motor} motor turns at {speed_rad_s:.1} rad/s")]
+    #[error(
+        "the {motor} motor turns at {speed_rad_s:.1} rad/s: put the wheels on the ground, or raise motor_speed_rad_s in [safety]"
+    )]
     MotorSpeed {
         /// Which.
         motor: Motor,
@@ -194,7 +199,10 @@ pub enum StopReason {
         speed_rad_s: f64,
     },
     /// A wheel turns too fast on the ground.
-    #[error("the {motor} wheel turns at {speed_rad_s:.1} rad/s relative to the body")]
+    #[error(
+        "the {motor} wheel turns at {speed_rad_s:.1} rad/s relative to the body: check that it does not slip, or raise \
+         wheel_speed_rad_s in [safety]"
+    )]
     WheelSpeed {
         /// Which.
         motor: Motor,
@@ -202,7 +210,10 @@ pub enum StopReason {
         speed_rad_s: f64,
     },
     /// The robot turns too fast.
-    #[error("the robot turns at {yaw_rate_rad_s:.2} rad/s")]
+    #[error(
+        "the robot turns at {yaw_rate_rad_s:.2} rad/s: check the directions of both motors in [link], or raise yaw_rate_rad_s \
+         in [safety]"
+    )]
     YawRate {
         /// Yaw rate, rad/s.
         yaw_rate_rad_s: f64,

@@ -41,7 +41,7 @@ impl Switching {
 
     /// The motors need not roll out any longer.
     pub(super) fn has_rolled_out(&mut self) {
-        self.waits_until = self.since;
+        (self.waits_until, self.next) = (self.since, self.since);
     }
 
     /// Whether the motors roll out.

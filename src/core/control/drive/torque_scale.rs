@@ -108,7 +108,7 @@ impl TorqueScale {
             balancing,
             start_s: if balancing { START_GROUND_S } else { START_AIR_S },
             nudge_nm: nudge_nm.min(GREATEST_SHARE * torque_limit_nm),
-            rows: Vec::new(),
+            rows: Vec::with_capacity(128),
             speed: 0.0,
             way: 0.0,
             last_s: 0.0,

@@ -91,8 +91,9 @@ struct Shaft {
     stands: bool,
     /// Change of speed that the torque must have caused since the reading changed last, rad/s.
     missed_rad_s: f64,
-    /// Least and greatest pitch since then, rad.
+    /// Least and greatest pitch since then, rad, and how far they must be apart.
     pitch_rad: [f64; 2],
+    body_rad: f64,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -104,8 +105,13 @@ struct Yaw {
 }
 
 impl WheelWatch {
-    pub(super) fn new(robot: &RobotModel) -> Self {
-        let response = Response::on_ground(robot).own;
+    /// Watches a robot that balances, or wheels in the air, where the body shows nothing of a motor that is held.
+    pub(super) fn new(robot: &RobotModel, balancing: bool) -> Self {
+        let (response, body_rad) = if balancing {
+            (Response::on_ground(robot).own, BODY_RAD)
+        } else {
+            (Response::in_air(robot).own, 0.0)
+        };
         let shaft = |curve: Option<Stribeck>| {
             let static_nm = curve
                 .map_or(STATIC_NM, |curve| curve.parameters().static_nm.max(curve.parameters().coulomb_nm));
@@ -118,6 +124,7 @@ impl WheelWatch {
                 stands: false,
                 missed_rad_s: 0.0,
                 pitch_rad: [f64::INFINITY, f64::NEG_INFINITY],
+                body_rad,
             }
         };
         Self {
@@ -134,6 +141,18 @@ impl WheelWatch {
         for shaft in &mut self.shafts {
             (shaft.last, shaft.mismatch_rad, shaft.disagreeing) = (None, 0.0, 0);
             shaft.stands_anew();
+        }
+    }
+
+    /// Takes the newest readings of motors that turn in the air, and the torques that acted when they were read.
+    pub(super) fn hear_in_air(
+        &mut self,
+        motors: &[MotorState; 2],
+        acted_nm: [f64; 2],
+        limits: &SafetyLimits,
+    ) {
+        for ((shaft, state), torque_nm) in self.shafts.iter_mut().zip(motors).zip(acted_nm) {
+            shaft.hear(state, 0.0, torque_nm, limits);
         }
     }
 
@@ -245,8 +264,8 @@ impl Shaft {
     }
 
     fn problem(&self, motor: Motor, limits: &SafetyLimits) -> Option<StopReason> {
-        let Self { mismatch_rad, missed_rad_s, pitch_rad: [least, greatest], .. } = *self;
-        if missed_rad_s > limits.motion_mismatch_rad_s && greatest - least > BODY_RAD {
+        let Self { mismatch_rad, missed_rad_s, pitch_rad: [least, greatest], body_rad, .. } = *self;
+        if missed_rad_s > limits.motion_mismatch_rad_s && greatest - least >= body_rad {
             return Some(StopReason::EncoderFrozen { motor, missed_rad_s });
         }
         (self.disagreeing >= DISAGREEING).then_some(StopReason::EncoderMismatch { motor, mismatch_rad })

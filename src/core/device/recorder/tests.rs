@@ -155,7 +155,10 @@ fn what_the_queue_cannot_take_is_counted() {
     assert_eq!(input.shared.lost(), [0, 3, 0]);
     (0..7).for_each(|_| input.row(&row()));
     let problem = input.shared.final_status().problem.unwrap();
-    assert_eq!(problem, "run.csv: 5 rows were lost, because the disk was too slow: record to another one");
+    assert_eq!(
+        problem,
+        "run.csv: 5 rows and 3 frames were lost, because the disk was too slow: record to another one"
+    );
 }
 
 /// Frames of two threads come a little out of order, also from one turn to the next.

@@ -49,9 +49,14 @@ impl FrameDecoder {
         }
     }
 
-    /// A frame that this program sends, by which its reply is distinguished from a command of somebody else.
+    /// A frame that this program orders to be sent, by which its reply is distinguished from a command of somebody else.
     pub(super) fn sent(&mut self, frame: &StampedFrame) {
         self.motors.extend(self.wheels.receive(frame));
+    }
+
+    /// One of them that was written to the bus.
+    pub(super) fn written(&mut self, frame: &StampedFrame) {
+        self.wheels.written(frame);
     }
 
     pub(super) fn clear(&mut self) {

@@ -146,6 +146,13 @@ impl Session {
                 ..
             }
         );
+        let role = role(&options)?;
+        let publisher = if matches!(options.source, Source::Replay { .. }) {
+            Publisher::direct(update_sender, wake)
+        } else {
+            Publisher::relayed(update_sender, wake)?
+        };
+        // Its files are made when nothing else can fail.
         let mut recording = Recording::new(about, bench);
         if let Some(name) = &options.record {
             recording.start(name).map_err(SessionError::Recording)?;
@@ -155,7 +162,7 @@ impl Session {
         }
         let worker = Worker {
             link,
-            role: role(&options)?,
+            role,
             decoder,
             heard: Heard::default(),
             pacer: Pacer::new(clock, TICK),
@@ -164,11 +171,7 @@ impl Session {
             orders,
             stop_line: Arc::clone(&stop_line),
             drive_orders: Vec::new(),
-            publisher: if matches!(options.source, Source::Replay { .. }) {
-                Publisher::direct(update_sender, wake)
-            } else {
-                Publisher::relayed(update_sender, wake)?
-            },
+            publisher,
         };
         let thread = Builder::new().name("control".to_owned()).spawn(move || {
             // A recording is in no hurry, and must not keep a core from everybody else.

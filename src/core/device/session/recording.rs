@@ -21,7 +21,7 @@ pub(super) struct Recording {
 /// What is done meanwhile.
 enum Work {
     Begins(JoinHandle<Result<Recorder, String>>),
-    Ends(JoinHandle<String>),
+    Ends(JoinHandle<RecordingStatus>),
 }
 
 impl Recording {
@@ -65,7 +65,7 @@ impl Recording {
             }
             (None, Some(recorder)) => {
                 self.input = None;
-                thread.spawn(move || finish(recorder)).map(Work::Ends)
+                thread.spawn(move || recorder.finish()).map(Work::Ends)
             }
             (None, None) => return Ok(()),
         };
@@ -92,17 +92,24 @@ impl Recording {
                 }
                 Err(problem) => Some((EventKind::Warning, problem)),
             },
-            Work::Ends(thread) => Some((EventKind::Note, thread.join().unwrap_or_else(|_| fault()))),
+            Work::Ends(thread) => {
+                Some((EventKind::Note, thread.join().map_or_else(|_| fault(), |status| recorded(&status))))
+            }
         }
     }
 
     /// Ends it, and waits until the files are whole.
     pub(super) fn end(&mut self) -> Option<RecordingStatus> {
-        if let Some(work) = self.work.take() {
-            self.take_up(work);
-        }
+        let ended = match self.work.take() {
+            Some(Work::Ends(thread)) => thread.join().ok(),
+            Some(begins) => {
+                self.take_up(begins);
+                None
+            }
+            None => None,
+        };
         self.input = None;
-        self.recorder.take().map(Recorder::finish)
+        self.recorder.take().map(Recorder::finish).or(ended)
     }
 }
 
@@ -111,9 +118,8 @@ fn begin(name: &Path, about: &About, bench: bool) -> Result<Recorder, String> {
 }
 
 /// What was recorded, in a sentence.
-fn finish(recorder: Recorder) -> String {
-    let status = recorder.finish();
-    status.problem.unwrap_or_else(|| {
+fn recorded(status: &RecordingStatus) -> String {
+    status.problem.clone().unwrap_or_else(|| {
         format!("{}: {} rows and {} frames were recorded", status.file.display(), status.rows, status.frames)
     })
 }

@@ -1,4 +1,4 @@
-//! A robot that is watched or driven: what is required of the session, and what it tells.
+//! A robot that is monitored or driven: orders to the session, and its updates.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -197,7 +197,7 @@ pub struct SessionOptions {
     pub replay_speed: f64,
 }
 
-/// What is required of a running session.
+/// Order to a running session.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SessionOrder {
     /// To the drive.

@@ -200,7 +200,7 @@ impl Worker {
 
     /// A frame that was written to the bus.
     fn hear_sent(&mut self, frame: &StampedFrame) {
-        self.decoder.sent(frame);
+        self.decoder.written(frame);
         self.counted.frame(frame);
         if let Some(recorder) = &self.recording.input {
             recorder.frame(frame);

@@ -1,4 +1,4 @@
-//! What a motor can be determined and asked.
+//! Commands of an LK motor: encoding and decoding.
 
 use super::{MotorId, i16_at, i32_at, u16_at};
 use crate::link::Frame;

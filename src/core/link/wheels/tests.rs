@@ -475,6 +475,32 @@ fn echoes_of_an_adapter_are_neither_commands_nor_replies() {
     }
 }
 
+/// A frame is ordered, then written: behind an adapter that returns it, the reply of the motor is a reply.
+#[test]
+fn a_frame_that_was_ordered_and_written_has_one_echo() {
+    let off = [0x80, 0, 0, 0, 0, 0, 0, 0];
+    for (command, on) in [(ON, true), (off, false)] {
+        let mut wheels = Wheels::new(&sixteen_turns());
+        let warm = reply(0x9C, state(31, 5, 40, 0x1200));
+        for at in [0.0, 1.0, 2.0] {
+            let query = stamped(at, Direction::Sent, 0x141, QUERY);
+            assert_eq!(wheels.receive(&query).count(), 0);
+            wheels.written(&StampedFrame { time: at_ms(at + 0.1), ..query });
+            wheels.receive(&received(at + 0.2, 0x141, QUERY)).for_each(drop);
+            wheels.receive(&received(at + 0.3, 0x141, warm)).for_each(drop);
+        }
+        let ordered = stamped(3.0, Direction::Sent, 0x141, command);
+        assert_eq!(wheels.receive(&ordered).count(), 0);
+        wheels.written(&StampedFrame { time: at_ms(3.1), ..ordered });
+        assert_eq!(wheels.receive(&received(3.2, 0x141, command)).count(), 0, "the echo");
+        let events: Vec<_> = wheels.receive(&received(3.4, 0x141, command)).collect();
+        let [MotorEvent::Switched { motor: Motor::Left, on: said, .. }] = events[..] else {
+            panic!("{events:?}")
+        };
+        assert_eq!(said, on);
+    }
+}
+
 /// Damaged replies of a serial line: each bit of each reply of a driven robot, one at a time.
 #[test]
 fn a_reply_with_a_wrong_bit_is_no_command() {

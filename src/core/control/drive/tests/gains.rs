@@ -167,6 +167,13 @@ fn the_gate_names_what_is_wrong() {
         matches!(friction, Refusal::Feedforward { excess_nm, .. } if (0.3..0.5).contains(&excess_nm)),
         "{friction}"
     );
+    for (stiffness_nm_rad, damping_nm_s_rad) in [(1e6, 0.0), (1e4, 10.0), (0.0, 1e3), (f64::INFINITY, 0.0)] {
+        let hold =
+            BalanceController { yaw_hold: YawHold { stiffness_nm_rad, damping_nm_s_rad }, ..good.clone() };
+        assert!(matches!(judged(&hold), Verdict::Refuse(Refusal::YawHold { .. })), "{hold:?}");
+    }
+    let free = YawHold { stiffness_nm_rad: 0.0, damping_nm_s_rad: 0.0 };
+    assert_eq!(judged(&BalanceController { yaw_hold: free, ..good.clone() }), Verdict::Accept);
     let text = refusal(|| weights(|w| w.set_state_weight(0, 1e30))).to_string();
     assert!(text.starts_with("the loop is unstable with its sampling and 4.0 ms of delay"), "{text}");
 }

@@ -83,6 +83,21 @@ fn values_at_their_limits_and_quiet_sensors_do_not_stop_the_robot() {
 }
 
 #[test]
+fn a_second_stop_switches_motors_off_that_still_roll_out() {
+    let mut robot = paper();
+    robot.safety.stop = crate::model::StopAction::ZeroThenOff;
+    let mut rig = Rig::balancing(&robot, ControllerKind::Flqr, DriveSettings::default(), 5);
+    rig.arm();
+    rig.run(1.0);
+    rig.robot.push(60.0, 0.2, None);
+    rig.run(0.3);
+    let first = rig.step(&[DriveOrder::Stop]).orders.to_vec();
+    let second = rig.step(&[DriveOrder::Stop]).orders.to_vec();
+    assert!(!first.contains(&MotorOrder::Off), "the motors did not roll: {first:?}");
+    assert!(second.contains(&MotorOrder::Off), "{second:?}");
+}
+
+#[test]
 fn limits_stop_the_robot_where_they_are_passed() {
     let (mut rig, _) = armed(3);
     rig.robot.push(300.0, 0.1, None);

@@ -97,6 +97,26 @@ fn wheels_and_robots_that_turn_too_fast_are_stopped() {
     assert!(matches!(reason, StopReason::YawRate { yaw_rate_rad_s } if yaw_rate_rad_s < 0.8), "{reason}");
 }
 
+/// Nothing else shows how fast a wheel in the air turns.
+#[test]
+fn a_frozen_encoder_of_a_wheel_in_the_air_stops_the_motors() {
+    for (fault, excitation) in [
+        (Fault::EncoderFrozen(Motor::Left), Excitation::SpeedSweep { seconds: 30.0 }),
+        (Fault::EncoderFrozen(Motor::Right), Excitation::Multisine { seconds: 30.0 }),
+        (Fault::BothEncodersFrozen, Excitation::SpeedSweep { seconds: 30.0 }),
+    ] {
+        let robot = paper();
+        let control = controller(&robot, ControllerKind::Lqr);
+        let drive = Drive::new(&robot, control, excitation, DriveSettings::default()).unwrap();
+        let mut rig = Rig::new(&robot, drive, true, true, 1);
+        let armed = rig.arm();
+        rig.faults.push((armed + 4000, fault));
+        let (time, reason) = rig.run(20.0).unwrap_or_else(|| panic!("{fault:?} goes unnoticed"));
+        let after_s = time.as_secs_f64() - 1e-3 * (armed + 4000) as f64;
+        assert!(reason.name() == "encoder_frozen" && after_s < 3.0, "{fault:?}: {reason} after {after_s} s");
+    }
+}
+
 /// A stand that tips over with the robot.
 #[test]
 fn a_robot_that_tips_with_its_wheels_in_the_air_is_stopped() {
