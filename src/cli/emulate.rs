@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use clap::Args;
 use flqr_core::emulator::{EmulatorSettings, TimedFault};
-use flqr_core::link::lk::ReplyId;
+use flqr_core::link::protocol::protocol;
 use flqr_core::model::LinkSettings;
 use flqr_core::model_file::presets;
 use serde_json::Value;
@@ -29,9 +29,10 @@ pub(crate) struct Arguments {
     /// Hold the wheels off the ground on a stand
     #[arg(long)]
     wheels_in_air: bool,
-    /// Base identifier of the motors' replies, 0x140 or 0x180 (+ motor number); documentation disagrees
-    #[arg(long, value_name = "ID", default_value = "0x140", value_parser = reply_id)]
-    reply_id: ReplyId,
+    /// Base identifier of the motors' replies, 0x140 or 0x180 (+ motor number) with the LK protocol, whose
+    /// documentation disagrees [default: 0x140]
+    #[arg(long, value_name = "ID")]
+    reply_id: Option<String>,
     /// Wiring that differs from the model's [link] table, such as current_steps_per_a=62.5
     /// or pitch_direction=backward; repeatable
     #[arg(long, value_name = "KEY=VALUE")]
@@ -81,12 +82,15 @@ impl FromStr for Override {
     }
 }
 
-fn reply_id(text: &str) -> Result<ReplyId, String> {
-    match text {
-        "0x140" => Ok(ReplyId::Shared),
-        "0x180" => Ok(ReplyId::Apart),
-        _ => Err("it must be 0x140 or 0x180".to_owned()),
-    }
+/// Base identifier of the replies, one of those of the protocol.
+fn reply_base(wiring: &LinkSettings, text: &str) -> Result<u16, Failure> {
+    let bases = protocol(wiring.protocol).reply_bases;
+    let number = text.strip_prefix("0x").and_then(|digits| u16::from_str_radix(digits, 16).ok());
+    number.filter(|number| bases.contains(number)).ok_or_else(|| {
+        let allowed = bases.iter().map(|base| format!("0x{base:X}")).collect::<Vec<_>>().join(" or ");
+        let text = format!("--reply-id {text}: it must be {allowed}\n");
+        Failure::Usage(clap::Error::raw(clap::error::ErrorKind::InvalidValue, text))
+    })
 }
 
 pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure> {
@@ -103,12 +107,15 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
             Failure::Message(format!("--balancing needs a controller for {name}: {problem}"))
         })
     });
+    let actual = actual(&robot.link, &arguments.actual)?;
+    let wiring = actual.unwrap_or(robot.link);
+    let reply_base = arguments.reply_id.as_ref().map(|text| reply_base(&wiring, text)).transpose()?;
     let settings = EmulatorSettings {
         seed: arguments.seed,
         wheels_in_air: arguments.wheels_in_air,
         on_board: on_board.transpose()?,
-        actual: actual(&robot.link, &arguments.actual)?,
-        reply_id: arguments.reply_id,
+        actual,
+        reply_base,
         flood_hz: arguments.flood,
         faults: arguments.fault.clone(),
     };

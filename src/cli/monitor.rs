@@ -23,7 +23,7 @@ pub(crate) struct Arguments {
     /// Model file of the robot, for its [link] settings [default: the paper's robot]
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// DBC file that describes the frames of a robot without LK motors; with --signal
+    /// DBC file that describes the frames of motors with another protocol than the model's; with --signal
     #[arg(long, value_name = "FILE", requires = "signal")]
     dbc: Option<PathBuf>,
     /// Column of the robot log (unit optional) for a signal of the DBC file, such as pitch=Imu.Pitch or

@@ -3,11 +3,11 @@
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
-use std::thread;
 
 use clap::Args;
 use flqr_core::model::Model;
 use flqr_core::model_file::presets;
+use flqr_core::parallel;
 use flqr_core::reproduce::{self, DEFAULT_SEEDS, Settings};
 
 use super::input;
@@ -40,12 +40,11 @@ pub(crate) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     let inputs: Vec<_> = arguments.model.iter().map(PathBuf::as_path).collect();
     output_file::check(&inputs, report.as_slice(), arguments.force)?;
     let (model, text) = load(arguments)?;
-    let every = || thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
     let settings = Settings {
         model_text: &text,
         seed: arguments.seed,
         seeds: arguments.seeds,
-        threads: arguments.threads.unwrap_or_else(every),
+        threads: arguments.threads.unwrap_or_else(parallel::available),
     };
     let bar = Progress::new("the paper's experiments");
     let found = reproduce::reproduce(&model, &settings, &mut |share| {

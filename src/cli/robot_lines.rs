@@ -362,7 +362,7 @@ impl MotorLine {
             missed: status.missed,
             temperature_c: status.temperature_c,
             current_a: status.current_a,
-            voltage_v: status.health.map(|health| health.voltage_v),
+            voltage_v: status.health.and_then(|health| health.voltage_v),
             round_trip_s: status.health.and_then(|health| health.round_trip).map(|time| time.as_secs_f64()),
             errors: status.health.map_or(Vec::new(), |health| health.errors.names().collect()),
         }

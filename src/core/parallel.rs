@@ -1,4 +1,4 @@
-//! The one data-parallel map of the house: its result does not depend on the number of threads.
+//! The one data-parallel map of the core: its result does not depend on the number of threads.
 #![expect(
     clippy::disallowed_methods,
     reason = "the only place in the core that starts threads; they end before the function returns, and no result depends on them"
@@ -9,6 +9,11 @@ use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc;
 use std::{panic, thread};
+
+/// Number of threads that the machine runs at the same time.
+pub fn available() -> NonZeroUsize {
+    thread::available_parallelism().unwrap_or(NonZeroUsize::MIN)
+}
 
 /// Applies `f` to every item, on up to `threads` threads; the results are in the order of the items.
 ///

@@ -2,9 +2,9 @@
 
 use super::kind::{Declared, EffectKind, Feedforward, Parameter, Place, Signal, Trial};
 use super::law::{Action, MotionSample, Term};
-use crate::model::Effect;
-use crate::model::MachineKind;
-use crate::model::{AxisModel, AxisParameters, RobotParameters};
+use crate::model::{
+    AxisModel, AxisParameters, Effect, MachineKind, ModelParameter, ParameterPlace, RobotParameters,
+};
 
 const ROBOT: &[MachineKind] = &[MachineKind::Robot];
 
@@ -31,10 +31,7 @@ pub(super) static MASS_ERROR: EffectKind = EffectKind {
     },
     separated_by: "a scale; a second leg height",
     feedforward: Feedforward::Declared,
-    declare: |effect, model| {
-        let added = effect.parameters()[0].1;
-        correct_robot(model, |p| RobotParameters { body_mass_kg: p.body_mass_kg + added, ..p })
-    },
+    declare: correct_robot,
 };
 
 /// Error of the declared height of the centre of mass.
@@ -61,10 +58,7 @@ pub(super) static COM_HEIGHT_ERROR: EffectKind = EffectKind {
     },
     separated_by: "balancing the body on an edge; a second leg height",
     feedforward: Feedforward::Declared,
-    declare: |effect, model| {
-        let added = effect.parameters()[0].1;
-        correct_robot(model, |p| RobotParameters { com_height_m: p.com_height_m + added, ..p })
-    },
+    declare: correct_robot,
 };
 
 /// Error of the declared body inertia.
@@ -81,10 +75,7 @@ pub(super) static BODY_INERTIA_ERROR: EffectKind = EffectKind {
     },
     separated_by: "the period of the body as a pendulum, suspended at the axle",
     feedforward: Feedforward::Declared,
-    declare: |effect, model| {
-        let added = effect.parameters()[0].1;
-        correct_robot(model, |p| RobotParameters { body_inertia_kg_m2: p.body_inertia_kg_m2 + added, ..p })
-    },
+    declare: correct_robot,
 };
 
 /// Error of the declared wheel inertia or carriage mass.
@@ -114,13 +105,7 @@ pub(crate) static INERTIA_ERROR: EffectKind = EffectKind {
 fn correct_moved(effect: &Effect, model: Declared<'_>) -> bool {
     let added = effect.parameters()[0].1;
     let moved = match model {
-        Declared::Robot(_) => {
-            let corrected = |p: RobotParameters| RobotParameters {
-                wheel_inertia_kg_m2: p.wheel_inertia_kg_m2 + added,
-                ..p
-            };
-            return correct_robot(model, corrected);
-        }
+        Declared::Robot(_) => return correct_robot(effect, model),
         Declared::Axis(AxisModel {
             parameters:
                 AxisParameters::Rotary { inertia_kg_m2: moved, .. }
@@ -135,10 +120,13 @@ fn correct_moved(effect: &Effect, model: Declared<'_>) -> bool {
     possible
 }
 
-/// Corrects the parameters of a robot if the result is physically possible.
-fn correct_robot(model: Declared<'_>, corrected: impl Fn(RobotParameters) -> RobotParameters) -> bool {
+/// Corrects the parameter of a robot that an effect stands for, if the result is physically possible.
+fn correct_robot(effect: &Effect, model: Declared<'_>) -> bool {
     let Declared::Robot(robot) = model else { return false };
-    let parameters = corrected(robot.parameters);
+    let parameter = ModelParameter::of_effect(effect.id(), MachineKind::Robot);
+    let Some(ParameterPlace::Robot(place)) = parameter.map(|parameter| parameter.place) else { return false };
+    let mut parameters = robot.parameters;
+    *place(&mut parameters) += effect.parameters()[0].1;
     let possible = parameters.validate().is_ok();
     if possible {
         robot.set_parameters(parameters);

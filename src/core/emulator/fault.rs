@@ -107,7 +107,7 @@ fn fault_of(text: &str) -> Option<Fault> {
             _ => {
                 let (motor, what) = motor_of(name)?;
                 match what {
-                    "errors" => Fault::MotorErrors(motor, MotorErrors(value?.parse().ok()?)),
+                    "errors" => Fault::MotorErrors(motor, MotorErrors(u32::from(value?.parse::<u8>().ok()?))),
                     "temperature" => Fault::MotorTemperature(motor, number()?),
                     "commanded" => Fault::Commanded(motor, value?.parse().ok()?),
                     _ => return None,

@@ -1,4 +1,4 @@
-//! The simulated robot behind the real bytes: motors of the LK protocol on CAN, a JY901 on a serial line.
+//! The simulated robot behind the real bytes: motors on CAN with the protocol of the wiring, a JY901 on a serial line.
 //!
 //! Time is an argument; same robot, settings and calls, same bytes. The robot moves in ticks of 1 ms. A motor
 //! answers 0.25 ms after a command with what it measured at the last tick, and a torque that comes within a tick
@@ -33,7 +33,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
 use crate::control::BalanceController;
-use crate::link::lk::{self, Address, Command, MotorId, ReplyId};
+use crate::link::protocol::{DriveAnswer, DriveSetup, protocol};
 use crate::link::{Direction, Frame, StampedFrame};
 use crate::model::{Actuation, Ground, LinkSettings, Motor, RobotModel, State, TICK_S};
 use crate::record::Readings;
@@ -70,8 +70,8 @@ pub struct EmulatorSettings {
     pub on_board: Option<BalanceController>,
     /// True wiring, if different from the model's.
     pub actual: Option<LinkSettings>,
-    /// Identifier that the motors answer on.
-    pub reply_id: ReplyId,
+    /// Base identifier of the motors' replies, if not the protocol's default.
+    pub reply_base: Option<u16>,
     /// Frames of other devices that fill the bus, in a second.
     pub flood_hz: u32,
     /// Faults.
@@ -95,14 +95,13 @@ pub struct EmulatorSettings {
 /// assert_eq!(reply.frame.bytes()[0], 0x9C);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Emulator {
     robot: SimulatedRobot,
     wheel_radius_m: f64,
     com_height_m: f64,
     gravity_m_s2: f64,
     in_air: bool,
-    reply_id: ReplyId,
     hand: Hand,
     motors: [EmulatedMotor; 2],
     imu: EmulatedImu,
@@ -153,9 +152,8 @@ impl Emulator {
             com_height_m: robot.parameters.com_height_m,
             gravity_m_s2: robot.parameters.gravity_m_s2,
             in_air: settings.wheels_in_air,
-            reply_id: settings.reply_id,
             hand,
-            motors: motors(robot, &wiring, settings.seed),
+            motors: motors(robot, &wiring, settings.seed, settings.reply_base),
             imu: EmulatedImu::new(&wiring, &robot.sensors),
             on_board: settings.on_board.map(|own| OnBoard::new(own, &driven(wiring), robot.safety.tilt_rad)),
             flood: Flood::new(settings.flood_hz, settings.seed),
@@ -225,7 +223,7 @@ impl Emulator {
             Fault::MotorVanishes(motor) => self.motors[motor as usize].lose_power(),
             Fault::MotorReturns(motor) => {
                 let shaft = self.shaft(motor as usize);
-                self.motors[motor as usize].power_up(&shaft);
+                self.motors[motor as usize].power_up(&shaft, self.voltage_v);
             }
             Fault::MotorErrors(motor, errors) => self.motors[motor as usize].set_causes(errors),
             Fault::MotorTemperature(motor, celsius) => self.motors[motor as usize].set_temperature_c(celsius),
@@ -244,10 +242,7 @@ impl Emulator {
             Fault::TorqueReversed(motor) => self.reversed[motor as usize] ^= true,
             Fault::TorquesSwapped => self.swapped ^= true,
             Fault::Commanded(motor, command) => {
-                let frame = Frame::full(
-                    self.motors[motor as usize].id().command_id(),
-                    [command, 0, 0, 0, 0, 0, 0, 0],
-                );
+                let frame = self.motors[motor as usize].foreign_command(command);
                 self.put(self.time(), frame);
                 self.obey(self.time(), &frame);
             }
@@ -361,6 +356,12 @@ impl Emulator {
             self.put(now, frame);
             self.obey(now, &frame);
         }
+        for motor in [0, 1] {
+            let shaft = self.measured_shaft(motor);
+            if let Some(frame) = self.motors[motor].tick(&shaft, self.voltage_v) {
+                self.put(now, frame);
+            }
+        }
         for StampedFrame { time, frame, .. } in self.flood.frames(self.tick).collect::<Vec<_>>() {
             self.put(time, frame);
         }
@@ -370,36 +371,21 @@ impl Emulator {
         if self.bus_off {
             return;
         }
-        match lk::address(frame) {
-            Some((Address::CommandOrReply(id), bytes)) => {
-                if let Some(motor) = self.motors.iter().position(|motor| motor.id() == id) {
-                    self.tell(now, motor, bytes);
-                }
+        for motor in [0, 1] {
+            let shaft = self.measured_shaft(motor);
+            let Some(answer) = self.motors[motor].receive(frame, &shaft, self.voltage_v) else { continue };
+            if self.motors[motor].is_driven() {
+                self.last_driven_tick = self.tick;
             }
-            Some((Address::Torques, bytes)) => {
-                let currents = lk::torques(bytes);
-                for motor in [0, 1] {
-                    let slot = usize::from(self.motors[motor].id().number()) - 1;
-                    if let Some(&iq) = currents.get(slot) {
-                        self.tell(now, motor, Command::TorqueCurrent { iq }.encode());
-                    }
-                }
+            if let DriveAnswer::Reply(frame) = answer {
+                self.put(now + REPLY_AFTER, frame);
             }
-            Some((Address::Reply(_), _)) | None => {}
         }
     }
 
-    fn tell(&mut self, now: Duration, motor: usize, command: [u8; 8]) {
-        let shaft = self.frozen[motor].unwrap_or_else(|| self.shaft(motor));
-        let told = &mut self.motors[motor];
-        let reply = told.answer(command, &shaft, self.voltage_v);
-        if told.is_driven() {
-            self.last_driven_tick = self.tick;
-        }
-        if let Some(reply) = reply {
-            let frame = reply.frame(self.motors[motor].id(), self.reply_id);
-            self.put(now + REPLY_AFTER, frame);
-        }
+    /// The shaft as the drive measures it.
+    fn measured_shaft(&self, motor: usize) -> Shaft {
+        self.frozen[motor].unwrap_or_else(|| self.shaft(motor))
     }
 
     fn shaft(&self, motor: usize) -> Shaft {
@@ -452,18 +438,24 @@ fn behind_the_wire(robot: &RobotModel) -> RobotModel {
 
 /// Settings by which torques can be requested.
 fn driven(wiring: LinkSettings) -> LinkSettings {
-    let torque_constant_nm_a = wiring.torque_constant_nm_a.or(Some(motor::TORQUE_CONSTANT_NM_A));
+    let torque_constant_nm_a =
+        wiring.torque_constant_nm_a.or(protocol(wiring.protocol).emulated_constant_nm_a);
     LinkSettings { torque_constant_nm_a, ..wiring }
 }
 
-fn motors(robot: &RobotModel, wiring: &LinkSettings, seed: u64) -> [EmulatedMotor; 2] {
+fn motors(
+    robot: &RobotModel,
+    wiring: &LinkSettings,
+    seed: u64,
+    reply_base: Option<u16>,
+) -> [EmulatedMotor; 2] {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     random.set_stream(ZEROS_STREAM);
     let torque_limit_nm = robot.limits.torque_nm.unwrap_or(f64::INFINITY);
     let inertia = robot.parameters.wheel_inertia_kg_m2;
     Motor::BOTH.map(|motor| {
-        let id = MotorId::new(wiring.motor_ids()[motor as usize]).expect("the wiring has been validated");
-        EmulatedMotor::new(motor, wiring, id, inertia, torque_limit_nm, random.next_u32())
+        let setup = DriveSetup { wiring, motor, random: random.next_u32(), reply_base };
+        EmulatedMotor::new(&setup, inertia, torque_limit_nm)
     })
 }
 

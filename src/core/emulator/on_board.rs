@@ -11,7 +11,7 @@ const HEALTH_TICKS: u64 = 100;
 const UPRIGHT_RAD: f64 = 0.02;
 
 /// The robot's own controller, on its own bus.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(super) struct OnBoard {
     controller: BalanceController,
     wheels: Wheels,

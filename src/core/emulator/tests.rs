@@ -13,7 +13,7 @@ use crate::link::{
     Bus, FrameId, ImuAssembler, ImuReading, MotorErrors, MotorEvent, MotorHealth, MotorOrder, MotorState,
     Wheels,
     jy901::{self, Content},
-    lk::Reply,
+    lk::{self, Command, MotorId, Reply},
 };
 use crate::lqr;
 use crate::model::{PitchAxis, StateLayout, TorqueCommand, Turn};
@@ -221,9 +221,9 @@ fn on_the_stand_angles_show_the_pitch_however_the_robot_is_wired() {
         LinkSettings { torque_command: TorqueCommand::Together, state_layout: StateLayout::Older, ..own },
         LinkSettings { torque_constant_nm_a: Some(0.81), current_steps_per_a: 62.5, ..own },
     ];
-    for (link, reply_id) in wirings.into_iter().zip([ReplyId::Shared, ReplyId::Apart].into_iter().cycle()) {
+    for (link, reply_base) in wirings.into_iter().zip([None, Some(0x180)].into_iter().cycle()) {
         let robot = RobotModel { link, ..paper() };
-        let mut host = Host::new(&robot, EmulatorSettings { reply_id, ..EmulatorSettings::default() });
+        let mut host = Host::new(&robot, EmulatorSettings { reply_base, ..EmulatorSettings::default() });
         for _ in 0..4000 {
             host.step(&MotorOrder::ReadState);
             if host.tick > 10 {
@@ -247,7 +247,10 @@ fn on_the_stand_angles_show_the_pitch_however_the_robot_is_wired() {
         host.step(&MotorOrder::ReadHealth);
         host.hear();
         let health = host.health[1].unwrap();
-        assert_eq!((health.voltage_v, health.errors.is_none(), host.place()), (24.0, true, Place::Stand));
+        assert_eq!(
+            (health.voltage_v.unwrap(), health.errors.is_none(), host.place()),
+            (24.0, true, Place::Stand)
+        );
         // It balances with the torque that is meant.
         let samples = host.balance(&flqr(&robot), 3000);
         assert!(samples.iter().all(|sample| sample.pitch_rad.abs() < 0.3), "{link:?}");
@@ -382,9 +385,9 @@ fn motors_answer_as_the_protocol_says() {
         assert_eq!(robot.frames(now + Duration::from_micros(249)), None);
         let reply = robot.frames(now + Duration::from_micros(250))?;
         assert_eq!(reply.frame.id().raw(), 0x180 + u32::from(number));
-        Reply::decode(reply.frame.bytes().try_into().unwrap(), StateLayout::Current)
+        Reply::decode(reply.frame.bytes().try_into().unwrap(), StateLayout::Current).ok()
     };
-    let settings = EmulatorSettings { reply_id: ReplyId::Apart, ..EmulatorSettings::default() };
+    let settings = EmulatorSettings { reply_base: Some(0x180), ..EmulatorSettings::default() };
     let robot = &mut Emulator::new(&paper(), settings).unwrap();
     for command in [Command::On, Command::Stop, Command::SetAngle { angle_cdeg: -12_345 }, Command::Off] {
         assert_eq!(answer(robot, 1, command), Some(Reply::Echo { bytes: command.encode() }));
@@ -437,7 +440,7 @@ fn faults_come_and_go_at_their_time() {
         host.step(order);
         host.hear();
         let health = host.health[1].unwrap();
-        (health.errors.0, health.voltage_v, health.on)
+        (health.errors.0, health.voltage_v.unwrap(), health.on)
     };
     host.read_for(100);
     assert_eq!(health(&mut host, &MotorOrder::ClearErrors), (9, 18.5, Some(false)), "the cause is there");

@@ -2,7 +2,7 @@
 //! speeds, angles and torques.
 //!
 //! [`Dbc`] reads the file, [`Choice`] says what a signal is, and [`SignalMap`] makes readings of frames. Such a
-//! robot can be watched and recorded; to be driven it has to speak the LK protocol.
+//! robot can be watched and recorded; to be driven it has to speak a protocol of [`super::protocol`].
 
 use super::{Frame, FrameId};
 

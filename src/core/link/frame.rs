@@ -77,7 +77,7 @@ impl Frame {
         Self::of(FrameId::extended(classes)?, FrameKind::Error, &details)
     }
 
-    /// The frame that every LK motor command and reply is: 8 bytes.
+    /// A data frame of 8 bytes.
     pub fn full(id: FrameId, bytes: [u8; 8]) -> Self {
         Self { id, kind: FrameKind::Data, length: 8, bytes }
     }

@@ -4,6 +4,7 @@
 //! mini-cheetah; whether J9 and J36 do is not known. Fields are big-endian, and a value is
 //! raw × span / (2ⁿ − 1) + minimum; zero lies between two steps.
 
+use super::describe::number;
 use super::{Frame, FrameId, FrameKind};
 
 const POSITION_RAD: f64 = 95.5;
@@ -138,6 +139,36 @@ fn lower(high: u8, low: u8) -> u16 {
 /// Two fields of 12 bits.
 fn pair(first: u16, second: u16) -> [u8; 3] {
     [(first >> 4) as u8, ((first & 0xF) << 4 | second >> 8 & 0xF) as u8, second as u8]
+}
+
+/// Identifiers of leg joints: commands carry the joint's number, and answers that of the computer, which is small too.
+/// Any frame of 6 or 8 bytes could be a joint's, so that others are left alone.
+const JOINT_IDS: std::ops::RangeInclusive<u16> = 0..=0x1F;
+
+/// A leg joint's frame; torque is a fraction of the greatest one, on which drivers of these joints disagree.
+pub(super) fn describe(frame: &Frame) -> Option<String> {
+    let FrameId::Standard(id) = frame.id() else { return None };
+    let joint = JointFrame::decode(frame).filter(|_| JOINT_IDS.contains(&id))?;
+    let text = match joint {
+        JointFrame::Enter => "enable".to_owned(),
+        JointFrame::Leave => "disable".to_owned(),
+        JointFrame::SetZero => "set zero".to_owned(),
+        JointFrame::Command { .. } => {
+            let [stiffness, damping] = joint.gains()?;
+            let (stiffness, damping) = (number(stiffness, 1), number(damping, 2));
+            format!("to {}, stiffness {stiffness}, damping {damping}", joint_motion(&joint)?)
+        }
+        JointFrame::Feedback { joint: number, .. } => {
+            return Some(format!("joint {number} reports {}", joint_motion(&joint)?));
+        }
+    };
+    Some(format!("joint {id} {text}"))
+}
+
+fn joint_motion(joint: &JointFrame) -> Option<String> {
+    let (angle_rad, speed_rad_s) = (number(joint.position_rad()?, 2), number(joint.speed_rad_s()?, 2));
+    let torque = number(100.0 * joint.torque(1.0)?, 0);
+    Some(format!("{angle_rad} rad, {speed_rad_s} rad/s, {torque} % of full torque"))
 }
 
 #[cfg(test)]

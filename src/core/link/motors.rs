@@ -1,4 +1,4 @@
-//! What the control loop asks of the two wheel motors and what it hears from them, in SI units, forward positive.
+//! Orders to the two wheel motors and events from them, in SI units, forward positive.
 
 use std::fmt;
 use std::time::Duration;
@@ -44,8 +44,8 @@ pub struct MotorHealth {
     pub time: Duration,
     /// Temperature, °C.
     pub temperature_c: f64,
-    /// Voltage of the supply, V.
-    pub voltage_v: f64,
+    /// Voltage of the supply, V, if the drive reports it.
+    pub voltage_v: Option<f64>,
     /// Current from the supply, A; not known of older firmware.
     pub supply_current_a: Option<f64>,
     /// Whether it is switched on; not known of older firmware.
@@ -56,9 +56,9 @@ pub struct MotorHealth {
     pub round_trip: Option<Duration>,
 }
 
-/// Error bits of a motor.
+/// Errors of a motor, one bit each; protocols with other codes translate them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct MotorErrors(pub u8);
+pub struct MotorErrors(pub u32);
 
 impl MotorErrors {
     const NAMES: [&'static str; 8] = [
@@ -77,7 +77,7 @@ impl MotorErrors {
         self.0 == 0
     }
 
-    /// What is wrong, in words (LK protocol 2.36; 2.35 has the first and the fourth only).
+    /// What is wrong, in words.
     pub fn names(self) -> impl Iterator<Item = &'static str> {
         Self::NAMES
             .into_iter()
@@ -118,8 +118,8 @@ pub enum MotorEvent {
         motor: Motor,
         /// When.
         time: Duration,
-        /// Command byte, or the identifier 0x280 of the frame with the torque currents of all motors.
-        command: u16,
+        /// Code by which the protocol names the command.
+        command: u32,
         /// Torque current of a torque command, A, forward positive.
         current_a: Option<f64>,
     },

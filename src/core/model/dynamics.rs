@@ -40,6 +40,7 @@
 use nalgebra::{Matrix4, Matrix4x2, Vector4};
 use serde::{Deserialize, Serialize};
 
+use super::ModelParameter;
 use crate::parameter::{ParameterError, positive};
 
 /// Acceleration of free fall in model files that give none, m/s².
@@ -152,13 +153,9 @@ impl Coefficients {
 impl RobotParameters {
     /// Refuses masses, lengths and inertias that are not finite and above zero.
     pub fn validate(&self) -> Result<(), ParameterError> {
-        positive("body_mass_kg", self.body_mass_kg)?;
-        positive("wheel_mass_kg", self.wheel_mass_kg)?;
-        positive("wheel_inertia_kg_m2", self.wheel_inertia_kg_m2)?;
-        positive("wheel_radius_m", self.wheel_radius_m)?;
-        positive("com_height_m", self.com_height_m)?;
-        positive("body_inertia_kg_m2", self.body_inertia_kg_m2)?;
-        positive("gravity_m_s2", self.gravity_m_s2)
+        let mut values = *self;
+        ModelParameter::of_robot()
+            .try_for_each(|(parameter, place)| positive(parameter.key, *place(&mut values)))
     }
 
     /// c₁…c₅ (Eq. 8).

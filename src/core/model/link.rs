@@ -9,6 +9,9 @@ use crate::parameter::{ParameterError, positive, within};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LinkSettings {
+    /// Protocol of the motor drives. Default: lk.
+    #[serde(skip_serializing_if = "MotorProtocolName::is_default")]
+    pub protocol: MotorProtocolName,
     /// Number of the left motor, 1 to 32: commands go to 0x140 + id. Default: 1.
     pub left_motor_id: u8,
     /// Number of the right motor. Default: 2.
@@ -35,6 +38,22 @@ pub struct LinkSettings {
     pub pitch_direction: Turn,
     /// Readings that the IMU is to send in a second. Default: 200.
     pub imu_rate_hz: u32,
+}
+
+/// Protocol of the motor drives on the bus.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum MotorProtocolName {
+    /// Shanghai Lingkong (LKMTECH), MF series.
+    #[default]
+    Lk,
+}
+
+impl MotorProtocolName {
+    /// Returns whether it is the default, which files leave out.
+    fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
 }
 
 /// A sense of rotation as the robot drives or leans forward.
@@ -90,6 +109,7 @@ pub enum PitchAxis {
 impl Default for LinkSettings {
     fn default() -> Self {
         Self {
+            protocol: MotorProtocolName::default(),
             left_motor_id: 1,
             right_motor_id: 2,
             left_direction: Turn::Forward,

@@ -10,3 +10,8 @@ pub enum MachineKind {
     /// A carriage.
     Linear,
 }
+
+impl MachineKind {
+    /// Every kind.
+    pub const ALL: [Self; 3] = [Self::Robot, Self::Rotary, Self::Linear];
+}

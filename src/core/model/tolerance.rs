@@ -1,6 +1,6 @@
 //! Tolerances of the declared numbers.
 
-use super::MachineKind;
+use super::{MachineKind, ModelParameter, PARAMETERS, ToleranceGroup};
 use crate::parameter::{ParameterError, within};
 
 /// Fractions of themselves by which declared numbers may be off; what a file does not name has its group's default.
@@ -10,60 +10,13 @@ pub struct Tolerances {
     pub(crate) named: Vec<(&'static str, f64)>,
 }
 
-/// Numbers of one kind.
-struct Group {
-    key: &'static str,
-    share: f64,
-    members: &'static [(&'static str, &'static [MachineKind])],
-}
-
-const ROBOT: &[MachineKind] = &[MachineKind::Robot];
-
-const ROTARY: &[MachineKind] = &[MachineKind::Rotary];
-
-const LINEAR: &[MachineKind] = &[MachineKind::Linear];
-
-const TURNING: &[MachineKind] = &[MachineKind::Robot, MachineKind::Rotary];
-
-const ALL: &[MachineKind] = &[MachineKind::Robot, MachineKind::Rotary, MachineKind::Linear];
-
-const MASSES: Group = Group {
-    key: "masses",
-    share: 0.02,
-    members: &[("body_mass_kg", ROBOT), ("wheel_mass_kg", ROBOT), ("mass_kg", LINEAR)],
-};
-
-const LENGTHS: Group =
-    Group { key: "lengths", share: 0.01, members: &[("wheel_radius_m", ROBOT), ("com_height_m", ROBOT)] };
-
-const INERTIAS: Group = Group {
-    key: "inertias",
-    share: 0.05,
-    members: &[("wheel_inertia_kg_m2", ROBOT), ("body_inertia_kg_m2", ROBOT), ("inertia_kg_m2", ROTARY)],
-};
-
-const FRICTION: Group = Group {
-    key: "friction",
-    share: 0.1,
-    members: &[
-        ("coulomb_nm", TURNING),
-        ("static_nm", TURNING),
-        ("viscous_nm_s_rad", TURNING),
-        ("stribeck_speed_rad_s", TURNING),
-        ("offset_nm", TURNING),
-        ("coulomb_n", LINEAR),
-        ("static_n", LINEAR),
-        ("viscous_n_s_m", LINEAR),
-        ("stribeck_speed_m_s", LINEAR),
-        ("offset_n", LINEAR),
-        ("stribeck_exponent", ALL),
-    ],
-};
-
-const GROUPS: [Group; 4] = [MASSES, LENGTHS, INERTIAS, FRICTION];
-
-/// A mass on a lever: known as well as both together.
-const GRAVITY: &str = "gravity_torque_nm";
+/// A tolerance that several parameters share: key, default fraction, members.
+const GROUPS: [(&str, f64, ToleranceGroup); 4] = [
+    ("masses", 0.02, ToleranceGroup::Masses),
+    ("lengths", 0.01, ToleranceGroup::Lengths),
+    ("inertias", 0.05, ToleranceGroup::Inertias),
+    ("friction", 0.1, ToleranceGroup::Friction),
+];
 
 impl Tolerances {
     /// By which fraction of itself the number with this key of the model file may be off; 0 where it has no tolerance.
@@ -72,14 +25,17 @@ impl Tolerances {
         if let Some((_, share)) = self.named.iter().find(|(name, _)| *name == key) {
             return *share;
         }
-        if key == GRAVITY {
-            return self.share_of(MASSES.key) + self.share_of(LENGTHS.key);
+        if let Some((_, share, _)) = GROUPS.iter().find(|(group, ..)| *group == key) {
+            return *share;
         }
-        if let Some(group) = GROUPS.iter().find(|group| group.key == key) {
-            return group.share;
+        match ModelParameter::of_key(key).map(|parameter| parameter.tolerance) {
+            Some(ToleranceGroup::MassesAndLengths) => self.share_of("masses") + self.share_of("lengths"),
+            Some(own) => {
+                let group = GROUPS.iter().find(|(_, _, group)| *group == own);
+                group.map_or(0.0, |(key, ..)| self.share_of(key))
+            }
+            None => 0.0,
         }
-        let group = GROUPS.iter().find(|group| group.members.iter().any(|(member, _)| *member == key));
-        group.map_or(0.0, |group| self.share_of(group.key))
     }
 
     /// Says how well a number, or a group of them, is known.
@@ -87,7 +43,7 @@ impl Tolerances {
     /// # Errors
     /// A share below 0 or above 1, or a key that no model has.
     pub fn set(&mut self, key: &str, share: f64) -> Result<(), ParameterError> {
-        let Some(key) = tolerance_keys(ALL).find(|name| *name == key) else {
+        let Some(key) = tolerance_keys(&MachineKind::ALL).find(|name| *name == key) else {
             let allowed = "left out, because no parameter of a model file has this name";
             return Err(ParameterError { name: "tolerance", value: share, allowed: allowed.into() });
         };
@@ -102,18 +58,19 @@ impl Tolerances {
 
 /// All keys that machines of some kinds may have.
 pub(crate) fn tolerance_keys(kinds: &[MachineKind]) -> impl Iterator<Item = &'static str> {
-    let has = |on: &[MachineKind]| on.iter().any(|kind| kinds.contains(kind));
+    let members = |group: ToleranceGroup| {
+        let own = move |parameter: &&ModelParameter| parameter.tolerance == group;
+        let on = |parameter: &&ModelParameter| parameter.machines.iter().any(|kind| kinds.contains(kind));
+        PARAMETERS.iter().filter(own).filter(on).map(|parameter| parameter.key).collect::<Vec<_>>()
+    };
     let mut found = Vec::new();
-    for group in &GROUPS {
-        let members: Vec<_> =
-            group.members.iter().filter(|(_, on)| has(on)).map(|(member, _)| *member).collect();
+    for (key, _, group) in GROUPS {
+        let members = members(group);
         if !members.is_empty() {
-            found.push(group.key);
+            found.push(key);
             found.extend(members);
         }
     }
-    if has(ROTARY) {
-        found.push(GRAVITY);
-    }
+    found.extend(members(ToleranceGroup::MassesAndLengths));
     found.into_iter()
 }

@@ -223,6 +223,9 @@ ground = [{}, { points_m = [[0.5, 0.0], [0.8, 0.03]] }]
         assert!((corrected.at_leg_height(0.42).unwrap().parameters.com_height_m - 0.07).abs() < 1e-15);
         assert_eq!(robot.sensors.imu_period_ticks(), 5);
         assert_eq!(robot.surroundings.tether.unwrap().stiffness_n_m, 12.0);
+        // Files from before there was a choice of protocols mean its default, which is not written.
+        let named = Model::from_toml(&format!("{WHOLE}[link]\nprotocol = \"lk\"\n"), "m.toml").unwrap();
+        assert!(named == model && !model.to_toml().contains("protocol"));
     }
 
     #[test]
@@ -236,6 +239,7 @@ ground = [{}, { points_m = [[0.5, 0.0], [0.8, 0.03]] }]
             ("imu_rate_hz = 200.0", "imu_rate_hz = 300.0", 22, "divides 1000"),
             ("no_load_speed_rad_s = 60.0", "no_load_speed_rad_s = 50.0", 18, "above rated_speed_rad_s"),
             ("slope_rad = 0.05", "slope_rad = 2.0", 24, "slope_rad = 2 is out of range"),
+            ("[sensors]", "[link]\nprotocol = \"can\"\n[sensors]", 22, "`lk`"),
             ("delay_s = 0.006", "delay = 0.006", 20, "unknown key `delay`: write `delay_s`"),
         ] {
             let error = Model::from_toml(&WHOLE.replacen(old, new, 1), "m.toml").unwrap_err();

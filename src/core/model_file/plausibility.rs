@@ -4,11 +4,10 @@ use std::fmt;
 use std::ops::RangeInclusive;
 
 use super::Entry;
-use crate::model::Model;
+use crate::model::{Model, PARAMETERS};
 use crate::unit_slip::{
-    self, CENTIMETRES, DEGREES, DEGREES_PER_SECOND, GRAM_SQUARE_CENTIMETRES, GRAMS,
-    KILOGRAM_SQUARE_CENTIMETRES, KILOGRAM_SQUARE_MILLIMETRES, MICROSECONDS, MILLIMETRES, MILLINEWTON_METRES,
-    MILLISECONDS, RPM, STANDARD_GRAVITIES, UnitSlip,
+    self, CENTIMETRES, DEGREES, DEGREES_PER_SECOND, GRAM_SQUARE_CENTIMETRES, KILOGRAM_SQUARE_CENTIMETRES,
+    KILOGRAM_SQUARE_MILLIMETRES, MICROSECONDS, MILLIMETRES, MILLINEWTON_METRES, MILLISECONDS, RPM, UnitSlip,
 };
 
 /// A value of a model file that no real machine is likely to have.
@@ -35,23 +34,11 @@ const INERTIA: &[UnitSlip] =
 const TORQUE: &[UnitSlip] = &[MILLINEWTON_METRES];
 const TIME: &[UnitSlip] = &[MILLISECONDS, MICROSECONDS];
 
-/// From toys of 50 g to machines of 300 kg; a zero that is allowed is plausible.
-const ROWS: [Row; 35] = [
-    ("robot", "body_mass_kg", "kg", 0.02..=300.0, &[GRAMS]),
-    ("robot", "wheel_mass_kg", "kg", 0.002..=50.0, &[GRAMS]),
-    ("robot", "wheel_inertia_kg_m2", "kg m²", 1e-8..=5.0, INERTIA),
-    ("robot", "wheel_radius_m", "m", 0.01..=0.6, LENGTH),
-    ("robot", "com_height_m", "m", 0.005..=1.5, LENGTH),
+/// Numbers that are not among the [`PARAMETERS`], as plausible as those.
+const ROWS: [Row; 16] = [
     ("robot", "leg_height_m", "m", 0.01..=2.0, LENGTH),
-    ("robot", "body_inertia_kg_m2", "kg m²", 1e-7..=100.0, INERTIA),
-    ("robot", "gravity_m_s2", "m/s²", 1.5..=30.0, &[STANDARD_GRAVITIES]),
     ("chassis", "track_width_m", "m", 0.03..=3.0, LENGTH),
     ("chassis", "yaw_inertia_kg_m2", "kg m²", 1e-7..=100.0, INERTIA),
-    ("friction", "coulomb_nm", "N m", 0.0..=10.0, TORQUE),
-    ("friction", "static_nm", "N m", 0.0..=10.0, TORQUE),
-    ("friction", "offset_nm", "N m", -5.0..=5.0, TORQUE),
-    ("friction", "viscous_nm_s_rad", "N m s/rad", 0.0..=1.0, &[]),
-    ("friction", "stribeck_speed_rad_s", "rad/s", 1e-4..=200.0, &[RPM, DEGREES_PER_SECOND]),
     ("compensation", "smoothing_speed_rad_s", "rad/s", 1e-5..=10.0, &[DEGREES_PER_SECOND, RPM]),
     ("limits", "torque_nm", "N m", 0.005..=200.0, TORQUE),
     ("limits", "torque_slew_nm_s", "N m/s", 0.1..=1e6, &[]),
@@ -65,13 +52,6 @@ const ROWS: [Row; 35] = [
     ("sensors", "pitch_rate_noise_rad_s", "rad/s", 0.0..=1.0, &[DEGREES_PER_SECOND]),
     ("surroundings", "slope_rad", "rad", -0.7..=0.7, &[DEGREES]),
     ("link", "torque_constant_nm_a", "N m/A", 0.003..=20.0, &[]),
-    ("axis", "mass_kg", "kg", 1e-3..=1e5, &[GRAMS]),
-    ("axis", "inertia_kg_m2", "kg m²", 1e-9..=1e3, INERTIA),
-    ("axis", "gravity_torque_nm", "N m", -1e3..=1e3, TORQUE),
-    ("friction", "coulomb_n", "N", 0.0..=1e4, &[]),
-    ("friction", "static_n", "N", 0.0..=1e4, &[]),
-    ("friction", "stribeck_speed_m_s", "m/s", 1e-6..=5.0, &[]),
-    ("friction", "offset_n", "N", -5e3..=5e3, &[]),
 ];
 
 /// Static friction below Coulomb friction, which no bearing has.
@@ -110,7 +90,10 @@ impl Model {
 fn implausible(key: &str, value: f64) -> Option<String> {
     let table = key.split('.').next()?;
     let name = key.rsplit('.').next()?.split('[').next()?;
-    let (_, _, unit, range, slips) = ROWS.iter().find(|row| row.0 == table && row.1 == name)?;
+    let parameter = PARAMETERS.iter().find(|row| row.table == table && row.key == name);
+    let of_parameter = parameter.map(|row| (row.unit, &row.plausible, row.slips));
+    let other = || ROWS.iter().find(|row| row.0 == table && row.1 == name);
+    let (unit, range, slips) = of_parameter.or_else(|| other().map(|row| (row.2, &row.3, row.4)))?;
     if range.contains(&value) {
         return None;
     }

@@ -1,12 +1,12 @@
 //! Rows of a robot's recorder, simulated or real.
 
-use super::schema;
+use super::schema::{self, Column};
 use crate::model::{Motor, State};
 use crate::record::Readings;
 
 /// Row of the robot's recorder: measured values, and the torque that was required of the
 /// motors. The columns are those of a robot log.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sample {
     /// Time since the start as the recorder stamped it, s.
     pub time_s: f64,
@@ -52,54 +52,65 @@ impl Sample {
 
     /// A row of a robot log: values in the order of [`Sample::COLUMNS`].
     pub fn from_row(row: [f64; 11]) -> Self {
-        let [
-            time_s,
-            x_m,
-            x_dot_m_s,
-            pitch_rad,
-            pitch_rate_rad_s,
-            motor_angle_left_rad,
-            motor_angle_right_rad,
-            motor_speed_left_rad_s,
-            motor_speed_right_rad_s,
-            torque_left_nm,
-            torque_right_nm,
-        ] = row;
-        Self {
-            time_s,
-            x_m,
-            x_dot_m_s,
-            pitch_rad,
-            pitch_rate_rad_s,
-            motor_angle_left_rad,
-            motor_angle_right_rad,
-            motor_speed_left_rad_s,
-            motor_speed_right_rad_s,
-            torque_left_nm,
-            torque_right_nm,
+        let mut sample = Self::default();
+        for (column, value) in SAMPLE_COLUMNS.iter().zip(row) {
+            *(column.place)(&mut sample) = value;
         }
+        sample
     }
 
     /// Names of the columns of a robot log, in the order of [`Sample::to_row`].
-    pub const COLUMNS: [&'static str; 11] = schema::ROBOT;
+    pub const COLUMNS: [&'static str; 11] = schema::names(&SAMPLE_COLUMNS);
 
     /// The values in the order of [`Sample::COLUMNS`].
     pub fn to_row(&self) -> [f64; 11] {
-        [
-            self.time_s,
-            self.x_m,
-            self.x_dot_m_s,
-            self.pitch_rad,
-            self.pitch_rate_rad_s,
-            self.motor_angle_left_rad,
-            self.motor_angle_right_rad,
-            self.motor_speed_left_rad_s,
-            self.motor_speed_right_rad_s,
-            self.torque_left_nm,
-            self.torque_right_nm,
-        ]
+        let mut sample = *self;
+        SAMPLE_COLUMNS.map(|column| *(column.place)(&mut sample))
     }
 }
+
+/// Required columns of a robot log. The unit of each is the ending of its name.
+pub(super) const SAMPLE_COLUMNS: [Column<Sample, f64>; 11] = [
+    Column { name: "time_s", topic: None, place: |row| &mut row.time_s },
+    Column { name: "x_m", topic: Some(("/state", "x_m")), place: |row| &mut row.x_m },
+    Column { name: "x_dot_m_s", topic: Some(("/state", "x_dot_m_s")), place: |row| &mut row.x_dot_m_s },
+    Column { name: "pitch_rad", topic: Some(("/state", "pitch_rad")), place: |row| &mut row.pitch_rad },
+    Column {
+        name: "pitch_rate_rad_s",
+        topic: Some(("/state", "pitch_rate_rad_s")),
+        place: |row| &mut row.pitch_rate_rad_s,
+    },
+    Column {
+        name: "motor_angle_left_rad",
+        topic: Some(("/motors/left", "angle_rad")),
+        place: |row| &mut row.motor_angle_left_rad,
+    },
+    Column {
+        name: "motor_angle_right_rad",
+        topic: Some(("/motors/right", "angle_rad")),
+        place: |row| &mut row.motor_angle_right_rad,
+    },
+    Column {
+        name: "motor_speed_left_rad_s",
+        topic: Some(("/motors/left", "speed_rad_s")),
+        place: |row| &mut row.motor_speed_left_rad_s,
+    },
+    Column {
+        name: "motor_speed_right_rad_s",
+        topic: Some(("/motors/right", "speed_rad_s")),
+        place: |row| &mut row.motor_speed_right_rad_s,
+    },
+    Column {
+        name: "torque_left_nm",
+        topic: Some(("/motors/left", "torque_nm")),
+        place: |row| &mut row.torque_left_nm,
+    },
+    Column {
+        name: "torque_right_nm",
+        topic: Some(("/motors/right", "torque_nm")),
+        place: |row| &mut row.torque_right_nm,
+    },
+];
 
 /// Recorded signals of two motors with their wheels in the air, left then right; of a single shaft both
 /// entries are the same.

@@ -4,6 +4,9 @@ use std::fmt;
 
 use serde::Serialize;
 
+use super::recording::{self, ROW_COLUMNS};
+use super::sample::{SAMPLE_COLUMNS, Sample};
+
 /// Kind of a log, recognised from its columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -23,32 +26,40 @@ pub const BENCH: &[&str] = &["time_s", "motor_angle_rad", "torque_nm"];
 /// Required columns of a linear axis log.
 pub const LINEAR_AXIS: &[&str] = &["time_s", "position_m", "force_n"];
 /// Required columns of a robot log.
-pub const ROBOT: [&str; 11] = [
-    "time_s",
-    "x_m",
-    "x_dot_m_s",
-    "pitch_rad",
-    "pitch_rate_rad_s",
-    "motor_angle_left_rad",
-    "motor_angle_right_rad",
-    "motor_speed_left_rad_s",
-    "motor_speed_right_rad_s",
-    "torque_left_nm",
-    "torque_right_nm",
-];
+pub const ROBOT: [&str; 11] = Sample::COLUMNS;
 /// Required columns of a file of friction pairs.
 pub const FRICTION_PAIRS: &[&str] = &["speed_rad_s", "torque_nm"];
-/// Columns that a log may have next to the required ones.
-pub const OPTIONAL: &[&str] = &[
-    "motor_speed_rad_s",
-    "motor_temperature_c",
-    "target_speed_rad_s",
-    "velocity_m_s",
-    "motor_temperature_left_c",
-    "motor_temperature_right_c",
-    "bus_voltage_v",
-    "round_trip_s",
-];
+/// Columns that a log of an axis may have next to the required ones.
+const OPTIONAL: [&str; 4] =
+    ["motor_speed_rad_s", "motor_temperature_c", "target_speed_rad_s", "velocity_m_s"];
+
+/// Column of a log: its name, which ends in the unit, and the place of its value in a row.
+pub(super) struct Column<Row, Value> {
+    pub(super) name: &'static str,
+    /// Topic and field in an MCAP file; `None` for the topic of all other columns.
+    pub(super) topic: Option<(&'static str, &'static str)>,
+    pub(super) place: fn(&mut Row) -> &mut Value,
+}
+
+/// Names of some columns.
+pub(super) const fn names<Row, Value, const N: usize>(
+    columns: &[Column<Row, Value>; N],
+) -> [&'static str; N] {
+    let mut names = [""; N];
+    let mut at = 0;
+    while at < N {
+        names[at] = columns[at].name;
+        at += 1;
+    }
+    names
+}
+
+/// Topic and field of a robot log's column in an MCAP file.
+pub(super) fn topic(name: &str) -> Option<(&'static str, &'static str)> {
+    let of_sample = SAMPLE_COLUMNS.iter().find(|column| column.name == name).map(|column| column.topic);
+    let of_row = || ROW_COLUMNS.iter().find(|column| column.name == name).map(|column| column.topic);
+    of_sample.or_else(of_row).flatten()
+}
 
 impl LogKind {
     /// Every kind, in the order in which a file is tried.
@@ -131,5 +142,6 @@ pub fn known() -> impl Iterator<Item = &'static str> {
         .chain(later(BENCH))
         .chain(later(LINEAR_AXIS))
         .chain(["speed_rad_s"])
-        .chain(OPTIONAL.iter().copied())
+        .chain(OPTIONAL)
+        .chain(recording::OPTIONAL_COLUMNS)
 }

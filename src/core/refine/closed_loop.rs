@@ -6,7 +6,6 @@
 //! leaves it.
 
 use std::f64::consts::TAU;
-use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
 
 use serde::Serialize;
@@ -134,7 +133,7 @@ pub(super) fn closed_loop(
     let scenarios = [Scenario::Station, Scenario::Multisine];
     let jobs: Vec<(Scenario, &Model)> =
         scenarios.iter().flat_map(|&scenario| [(scenario, declared), (scenario, actual)]).collect();
-    let runs = parallel::map(&jobs, threads(), |(scenario, controller)| {
+    let runs = parallel::map(&jobs, parallel::available(), |(scenario, controller)| {
         let run = ground_run(*scenario, controller, actual, SECONDS, seed)?;
         Some(told(&run, actual.robot()?, *scenario, FROM_S))
     });
@@ -150,10 +149,6 @@ fn effects_of(model: &Model) -> &[Effect] {
         Rig::Robot(robot) => &robot.effects,
         Rig::Axis(axis) => &axis.effects,
     }
-}
-
-fn threads() -> NonZeroUsize {
-    NonZeroUsize::new(2).expect("2 is not 0")
 }
 
 fn ground_run(
@@ -336,7 +331,7 @@ fn trial(
     let some = feeding(&|place| place == added || beside.contains(&place));
     let plants = variations(refined, added);
     let jobs: Vec<(usize, &Model)> = (0..plants.len()).flat_map(|n| [(n, &none), (n, &some)]).collect();
-    let runs = parallel::map(&jobs, threads(), |(n, controller)| {
+    let runs = parallel::map(&jobs, parallel::available(), |(n, controller)| {
         ground_run(Scenario::Station, controller, &plants[*n].1, CHECK_SECONDS, seed.wrapping_add(*n as u64))
     });
     let (mut swing, mut worst) = ([0.0; 2], None);

@@ -184,13 +184,6 @@ pub enum ExperimentError {
     },
 }
 
-impl ExperimentError {
-    /// Returns whether scenario and controller do not go together, whatever the models.
-    pub fn is_wrong_usage(&self) -> bool {
-        matches!(self, Self::PiOnGround { .. } | Self::NoEffect { .. })
-    }
-}
-
 /// Outcome of an experiment.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {

@@ -15,7 +15,6 @@ mod noise;
 mod planar;
 mod plant;
 mod recovery;
-mod response;
 mod robot;
 mod scenario;
 mod sensors;
@@ -33,7 +32,6 @@ pub(crate) use noise::Noise;
 pub use planar::{Forcing, PlanarPlant, Trial, TrialOutcome, advance_batch, monte_carlo};
 pub use plant::{Followed, Plant, Pose};
 pub use recovery::{Recovery, largest_pitch, recovery};
-pub use response::predicted_response;
 pub use robot::SimulatedRobot;
 pub use scenario::{Scenario, UnknownScenario};
 pub use simulation::{

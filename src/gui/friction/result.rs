@@ -2,6 +2,7 @@
 
 use egui::{Grid, RichText, Ui};
 use flqr_core::identify::{Estimate, FitReport, StopReason};
+use flqr_core::model::PARAMETERS;
 use flqr_core::record::Severity;
 
 use super::fit::FitRun;
@@ -9,24 +10,6 @@ use super::fitted::Fitted;
 use crate::command::{Command, Target};
 use crate::context::ViewContext;
 use crate::widgets::{hint_ui, mono, section_ui, shown, warning_ui};
-
-/// Names for people and units of the keys of the model file.
-const NAMES: &[(&str, &str, &str)] = &[
-    ("coulomb_nm", "Coulomb", "N m"),
-    ("static_nm", "static", "N m"),
-    ("viscous_nm_s_rad", "viscous", "N m s/rad"),
-    ("stribeck_speed_rad_s", "Stribeck speed", "rad/s"),
-    ("stribeck_exponent", "exponent", ""),
-    ("offset_nm", "offset", "N m"),
-    ("inertia_kg_m2", "inertia", "kg m²"),
-    ("gravity_torque_nm", "gravity torque", "N m"),
-    ("mass_kg", "mass", "kg"),
-    ("coulomb_n", "Coulomb", "N"),
-    ("static_n", "static", "N"),
-    ("viscous_n_s_m", "viscous", "N s/m"),
-    ("stribeck_speed_m_s", "Stribeck speed", "m/s"),
-    ("offset_n", "offset", "N"),
-];
 
 pub(super) fn ui(context: &ViewContext<'_>, fit: &FitRun, ui: &mut Ui) {
     section_ui(ui, "Result", |_| {});
@@ -93,9 +76,9 @@ fn in_order(report: &FitReport) -> Vec<(&'static str, &'static str, &'static str
         .parameters
         .iter()
         .map(|(key, estimate)| {
-            let place = NAMES.iter().position(|(name, ..)| name == key);
-            let (name, unit) = place.map_or((*key, ""), |place| (NAMES[place].1, NAMES[place].2));
-            (place.unwrap_or(NAMES.len()), (*key, name, unit, *estimate))
+            let place = PARAMETERS.iter().position(|parameter| parameter.key == *key);
+            let (name, unit) = place.map_or((*key, ""), |at| (PARAMETERS[at].name, PARAMETERS[at].unit));
+            (place.unwrap_or(PARAMETERS.len()), (*key, name, unit, *estimate))
         })
         .collect();
     rows.sort_by_key(|(place, _)| *place);

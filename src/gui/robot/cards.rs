@@ -75,7 +75,7 @@ fn motor_ui(motor: Motor, status: &MotorStatus, ui: &mut Ui) {
             .on_hover_text("Round-trip time of a query");
     }
     row_ui(ui, "temperature", &with_unit(status.temperature_c, 0, "°C"), None);
-    let voltage = status.health.map(|health| health.voltage_v);
+    let voltage = status.health.and_then(|health| health.voltage_v);
     row_ui(ui, "supply", &with_unit(voltage, 1, "V"), None);
     // Of a motor that is no longer asked nobody knows what it does now.
     let is_old = status.age.is_some_and(|age| age > OLD);

@@ -10,6 +10,7 @@ use flqr_core::device::{
 };
 
 use flqr_core::link::dbc::Choice;
+use flqr_core::link::protocol::protocol;
 use serde::{Deserialize, Serialize};
 
 use super::discovery::{can_ui, ports_ui};
@@ -77,7 +78,7 @@ pub(crate) struct ConnectionForm {
     pub(crate) imu_baud: String,
     pub(crate) replay: String,
     pub(super) replay_speed: f64,
-    /// Path of a DBC file and which of its signals are what; empty of a robot with LK motors.
+    /// Path of a DBC file and which of its signals are what; empty if the motors speak the protocol of the model.
     dbc: String,
     signals: String,
     /// Never kept: a robot is listened to until somebody says otherwise.
@@ -344,9 +345,9 @@ impl ConnectionForm {
 
     fn dbc_ui(&mut self, ui: &mut Ui) {
         CollapsingHeader::new("Another robot (DBC file)").show(ui, |ui| {
-            hint_ui(ui, "For a robot without LK motors: file that describes its frames, and the mapping of its signals.");
+            hint_ui(ui, "For motors with another protocol than the model's: file that describes its frames, and the mapping of its signals.");
             let field = |text, hint| TextEdit::singleline(text).hint_text(hint).desired_width(f32::INFINITY);
-            ui.add(field(&mut self.dbc, "none: LK motors")).accessible_name("DBC file");
+            ui.add(field(&mut self.dbc, "none: protocol of the model")).accessible_name("DBC file");
             let signals = TextEdit::multiline(&mut self.signals)
                 .hint_text("pitch=Imu.Pitch\nmotor_speed_left=SpeedLeft\nmotor_speed_right=SpeedRight")
                 .desired_rows(3)
@@ -374,11 +375,9 @@ impl ConnectionForm {
         self.task_ui(ui);
         let robot = context.session.robot();
         let wired = matches!(context.source, Source::Can | Source::Slcan);
-        if wired && robot.is_some_and(|robot| robot.link.torque_constant_nm_a.is_none()) {
-            warning_ui(
-                ui,
-                "The model has no torque_constant_nm_a in [link] (0.32 or 0.81 N m/A, depending on the winding), which is needed to command torque.",
-            );
+        let torques = robot.map(|robot| (protocol(robot.link.protocol).host)(&robot.link).torque_range());
+        if let Some(Err(missing)) = torques.filter(|_| wired) {
+            warning_ui(ui, format!("Torque cannot be commanded: {missing}."));
         }
     }
 

@@ -4,10 +4,9 @@ use std::collections::VecDeque;
 use std::fmt::Write;
 
 use egui::{Label, RichText, ScrollArea, TextEdit, Ui};
-use flqr_core::link::{Direction, FrameId, StampedFrame};
+use flqr_core::link::{Direction, FrameId, StampedFrame, describe};
 use flqr_core::model::LinkSettings;
 
-use super::frame_decoder::decoded;
 use crate::widgets::{choice_ui, hint_ui, mono, section_ui};
 
 /// Frames that are kept, before and after the filter.
@@ -73,7 +72,7 @@ impl Test {
             push(buffer, format_args!("{byte:02x}"));
         }
         buffer.contains(&self.text)
-            || decoded(stamped, settings).is_some_and(|text| text.to_lowercase().contains(&self.text))
+            || describe(stamped, settings).is_some_and(|text| text.to_lowercase().contains(&self.text))
     }
 }
 
@@ -213,7 +212,7 @@ fn line(stamped: &StampedFrame, settings: &LinkSettings) -> String {
     while text.len() < start + 25 {
         text.push(' ');
     }
-    text.push_str(&decoded(stamped, settings).unwrap_or_default());
+    text.push_str(&describe(stamped, settings).unwrap_or_default());
     text
 }
 

@@ -7,7 +7,6 @@ mod drive;
 mod events;
 mod feed;
 mod form;
-mod frame_decoder;
 mod frames;
 mod jitter;
 mod link;

@@ -90,7 +90,7 @@ fn numbers(status: &Status) -> Value {
             "missed": motor.missed,
             "temperature_c": motor.temperature_c,
             "current_a": motor.current_a,
-            "voltage_v": motor.health.map(|health| health.voltage_v),
+            "voltage_v": motor.health.and_then(|health| health.voltage_v),
             "round_trip_s": motor.health.and_then(|health| health.round_trip).map(|time| time.as_secs_f64()),
             "errors": motor.health.map(|health| health.errors.to_string()),
         })),

@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 use egui::{CollapsingHeader, Grid, Ui};
 use flqr_core::ParameterError;
 use flqr_core::friction::{Stribeck, StribeckParameters};
-use flqr_core::model::RobotParameters;
+use flqr_core::model::{ModelParameter, RobotParameters};
 use flqr_core::model_file::presets;
 
 use crate::command::Command;
@@ -36,32 +36,6 @@ pub(super) struct ParameterEditor {
     torque_limit_nm: Option<f64>,
 }
 
-type Field<T> = (&'static str, &'static str, &'static str, &'static str, fn(&mut T) -> &mut f64);
-
-/// Key in the model file, name, unit, help, and where the value is.
-const ROBOT_FIELDS: [Field<RobotParameters>; 7] = [
-    ("body_mass_kg", "body mass", "kg", "Everything above the axle", |p| &mut p.body_mass_kg),
-    ("wheel_mass_kg", "wheel mass", "kg", "One wheel", |p| &mut p.wheel_mass_kg),
-    ("wheel_inertia_kg_m2", "wheel inertia", "kg m²", "One wheel and its rotor about the axle", |p| {
-        &mut p.wheel_inertia_kg_m2
-    }),
-    ("wheel_radius_m", "wheel radius", "m", "Axle to ground", |p| &mut p.wheel_radius_m),
-    ("com_height_m", "centre of mass", "m", "Axle to the body's centre of mass", |p| &mut p.com_height_m),
-    ("body_inertia_kg_m2", "body inertia", "kg m²", "About the body's centre of mass", |p| {
-        &mut p.body_inertia_kg_m2
-    }),
-    ("gravity_m_s2", "gravity", "m/s²", "Gravitational acceleration", |p| &mut p.gravity_m_s2),
-];
-
-const FRICTION_FIELDS: [Field<StribeckParameters>; 6] = [
-    ("coulomb_nm", "Coulomb", "N m", "Coulomb friction", |p| &mut p.coulomb_nm),
-    ("static_nm", "static", "N m", "Static (breakaway) friction", |p| &mut p.static_nm),
-    ("viscous_nm_s_rad", "viscous", "N m s/rad", "Viscous friction coefficient", |p| &mut p.viscous_nm_s_rad),
-    ("stribeck_speed_rad_s", "Stribeck speed", "rad/s", "Stribeck speed", |p| &mut p.stribeck_speed_rad_s),
-    ("stribeck_exponent", "exponent", "", "Stribeck exponent", |p| &mut p.stribeck_exponent),
-    ("offset_nm", "offset", "N m", "Constant offset", |p| &mut p.offset_nm),
-];
-
 impl ParameterEditor {
     pub(super) fn new(session: &Session) -> Self {
         let curve = |motor| session.friction(motor).map(|curve| *curve.parameters());
@@ -90,11 +64,11 @@ impl ParameterEditor {
         let before = *robot;
         let refused = robot.validate().err();
         Grid::new("robot").num_columns(3).spacing([8.0, 3.0]).show(ui, |ui| {
-            for (key, name, unit, help, value) in ROBOT_FIELDS {
-                ui.label(name).on_hover_text(help);
-                let field = number_ui(ui, value(robot), &format!("{name} value"), 64.0);
-                field.on_hover_text(help);
-                ui.label(unit);
+            for (ModelParameter { key, name, unit, help, .. }, place) in ModelParameter::of_robot() {
+                ui.label(*name).on_hover_text(*help);
+                let field = number_ui(ui, place(robot), &format!("{name} value"), 64.0);
+                field.on_hover_text(*help);
+                ui.label(*unit);
                 ui.end_row();
                 problem_row_ui(ui, refused.as_ref(), key);
             }
@@ -137,13 +111,13 @@ impl ParameterEditor {
                 }
             }
             ui.end_row();
-            for (_, name, unit, help, value) in FRICTION_FIELDS {
-                ui.label(name).on_hover_text(format!("{help} [{unit}]"));
+            for (ModelParameter { name, unit, help, .. }, place) in ModelParameter::of_motor_friction() {
+                ui.label(*name).on_hover_text(format!("{help} [{unit}]"));
                 for (motor, side) in MOTORS.into_iter().enumerate() {
                     match &mut self.friction[motor] {
                         Some(curve) => {
                             let accessible = format!("{name} friction {side}");
-                            let field = number_ui(ui, value(curve), &accessible, 54.0);
+                            let field = number_ui(ui, place(curve), &accessible, 54.0);
                             field.on_hover_text(format!("{help}, {side} motor [{unit}]"));
                         }
                         None => {

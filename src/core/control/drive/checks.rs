@@ -7,6 +7,7 @@ use super::sign::{Rocking, Slope};
 use super::stage::{Check, CheckResult};
 use super::watch::Watch;
 use crate::link::MotorHealth;
+use crate::link::protocol::protocol;
 use crate::model::{Motor, RobotModel};
 
 /// A motor or an IMU answers if it was received within this time, s.
@@ -244,6 +245,9 @@ fn nobody_else(now: Duration, watch: &Watch) -> Check {
 /// Replies come soon enough.
 fn round_trip(watch: &Watch, robot: &RobotModel) -> Check {
     const NAME: &str = "round trip";
+    if protocol(robot.link.protocol).reports_unprompted {
+        return passed(NAME, "the motors report unprompted".to_owned());
+    }
     let [Some(left), Some(right)] = watch.motors.map(|motor| motor.round_trips.upper_quartile_s()) else {
         return waiting(NAME, "is measured".to_owned());
     };
@@ -281,9 +285,11 @@ fn of_health(watch: &Watch, robot: &RobotModel) -> [Check; 3] {
 
 fn voltage(name: &'static str, both: &[MotorHealth; 2], robot: &RobotModel) -> Check {
     let [least, greatest] = [robot.safety.least_voltage_v, robot.safety.greatest_voltage_v];
-    let outside = both.iter().map(|health| health.voltage_v).find(|v| !(least..=greatest).contains(v));
-    match outside {
-        None => passed(name, format!("{:.1} and {:.1} V", both[0].voltage_v, both[1].voltage_v)),
+    let [Some(left), Some(right)] = both.map(|health| health.voltage_v) else {
+        return passed(name, "not reported by the motors".to_owned());
+    };
+    match [left, right].into_iter().find(|v| !(least..=greatest).contains(v)) {
+        None => passed(name, format!("{left:.1} and {right:.1} V")),
         Some(found) => failed(
             name,
             format!(

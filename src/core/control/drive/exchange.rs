@@ -30,12 +30,9 @@ impl Default for DriveSettings {
 /// A robot that cannot be driven.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum DriveError {
-    /// The torque per ampere is unknown.
-    #[error(
-        "the robot can be monitored but not driven: set torque_constant_nm_a in [link], 0.32 N m/A of the MF9025v2-16T \
-         or 0.81 N m/A of the -35T"
-    )]
-    NoTorqueConstant,
+    /// Torques that the motor protocol cannot express; what to set.
+    #[error("the robot can be monitored but not driven: {0}")]
+    NoTorqueRange(&'static str),
     /// Torques without bound.
     #[error(
         "the robot can be monitored but not driven: set torque_nm in [limits], the largest torque of one motor"
@@ -43,8 +40,8 @@ pub enum DriveError {
     NoTorqueLimit,
     /// A limit that the current command cannot express.
     #[error(
-        "torque_nm = {limit_nm} in [limits] is above {greatest_nm:.2} N m, the largest torque of the current \
-         command (2048 steps): lower it, or check torque_constant_nm_a and current_steps_per_a in [link]"
+        "torque_nm = {limit_nm} in [limits] is above {greatest_nm:.2} N m, the largest torque of the motor \
+         protocol: lower it, or check torque_constant_nm_a and current_steps_per_a in [link]"
     )]
     TorqueLimit {
         /// Of the model, N m.

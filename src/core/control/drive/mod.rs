@@ -43,6 +43,7 @@ use std::time::Duration;
 
 use crate::control::{BalanceController, Reference, gate};
 use crate::link::MotorOrder;
+use crate::link::protocol::protocol;
 use crate::model::{Motor, RobotModel, State, StopAction, TICK_S};
 use crate::record::{BenchSample, Sample};
 use checks::Checks;
@@ -63,17 +64,11 @@ const STATE_PERIOD: Duration = Duration::from_millis(5);
 const CHECK_PERIOD: Duration = Duration::from_millis(50);
 /// Longest time until a motor has said that it is on.
 const ON_TIMEOUT: Duration = Duration::from_millis(200);
-/// Steps of the current command (LK protocol).
-const CURRENT_STEPS: f64 = 2048.0;
 /// Time from arming until the whole torque is there, s.
 const RAMP_S: f64 = 0.2;
 /// Speed from which on motors that roll out are switched off, rad/s, and age of a reading of it.
 const SLOW_RAD_S: f64 = 1.0;
 const FRESH: Duration = Duration::from_millis(20);
-/// What the LK protocol cannot tell (versions 2.35 and 2.36 have no such parameter).
-const NO_TIMEOUT: &str = "the timeout of the motors cannot be read with the LK protocol: if this computer, the adapter \
-    or a cable fails, they hold their last torque. Set the timeout with the manufacturer's tool, and keep the switch of their supply within reach";
-
 /// A robot that is driven, or may be.
 #[derive(Clone, Debug)]
 pub struct Drive {
@@ -221,7 +216,8 @@ impl Drive {
             output.events.push(DriveEvent::Warning(text.to_owned()));
         }
         output.events.extend(self.robot.safety.unsafe_limits().into_iter().map(DriveEvent::Warning));
-        output.events.push(DriveEvent::Warning(NO_TIMEOUT.to_owned()));
+        let loss = protocol(self.robot.link.protocol).command_loss;
+        output.events.extend(loss.map(|text| DriveEvent::Warning(text.to_owned())));
         self.checks = Checks::new(self.program.balances(), now);
         (self.next_health, self.next_state, self.next_checks) = (now, now, now);
         self.reach(Stage::Checking, output);
@@ -499,12 +495,12 @@ fn due(next: &mut Duration, now: Duration, period: Duration) -> bool {
     is_due
 }
 
-/// The model's limit, within what the current command can ask for.
+/// The model's limit, within the range of the torque command.
 fn torque_limit(robot: &RobotModel) -> Result<f64, DriveError> {
-    let link = &robot.link;
-    let constant = link.torque_constant_nm_a.ok_or(DriveError::NoTorqueConstant)?;
+    let host = (protocol(robot.link.protocol).host)(&robot.link);
+    let range = host.torque_range().map_err(DriveError::NoTorqueRange)?;
     let limit_nm = robot.limits.torque_nm.ok_or(DriveError::NoTorqueLimit)?;
-    let greatest_nm = CURRENT_STEPS / link.current_steps_per_a * constant;
+    let greatest_nm = range.max_nm;
     if limit_nm > greatest_nm {
         return Err(DriveError::TorqueLimit { limit_nm, greatest_nm });
     }

@@ -134,8 +134,8 @@ pub enum StopReason {
     OtherController {
         /// Which.
         motor: Motor,
-        /// Command byte, or 0x280.
-        command: u16,
+        /// Code of the command in the motor protocol.
+        command: u32,
     },
     /// Error bits.
     #[error("the {motor} motor reports {errors}")]
@@ -332,8 +332,8 @@ pub enum StopReason {
     },
     /// A motor does much more or less than it is requested.
     #[error(
-        "the torque of the motors is {factor:.2} times the command: check torque_constant_nm_a (0.32 or 0.81) and \
-         current_steps_per_a (124.12 or 62.5) in [link]"
+        "the torque of the motors is {factor:.2} times the command: check torque_constant_nm_a and \
+         current_steps_per_a in [link]"
     )]
     TorqueScale {
         /// Done over asked.

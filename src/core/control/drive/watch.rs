@@ -23,7 +23,7 @@ pub(super) struct MotorWatch {
     pub(super) state: Option<MotorState>,
     pub(super) health: Option<MotorHealth>,
     /// When another controller was received last to command it, and the command.
-    pub(super) commanded: Option<(Duration, u16)>,
+    pub(super) commanded: Option<(Duration, u32)>,
     pub(super) round_trips: RoundTrips,
     /// When it was received again after a silence over which its turns cannot be known.
     turns_lost: Option<Duration>,
@@ -150,7 +150,7 @@ impl MotorWatch {
         if health.on == Some(false) && health.time > on_since + ON_SETTLE {
             return Some(StopReason::MotorOff { motor });
         }
-        let voltage_v = health.voltage_v;
+        let voltage_v = health.voltage_v?;
         let allowed = limits.least_voltage_v..=limits.greatest_voltage_v;
         (!allowed.contains(&voltage_v)).then_some(StopReason::Voltage { voltage_v })
     }
@@ -221,7 +221,9 @@ fn is_finite(event: &MotorEvent) -> bool {
             // Its temperature may not be known.
             [state.angle_rad, state.speed_rad_s, state.current_a].iter().all(|v| v.is_finite())
         }
-        MotorEvent::Health(_, health) => health.temperature_c.is_finite() && health.voltage_v.is_finite(),
+        MotorEvent::Health(_, health) => {
+            health.temperature_c.is_finite() && health.voltage_v.is_none_or(f64::is_finite)
+        }
         MotorEvent::Switched { .. } | MotorEvent::TurnsLost { .. } => true,
         MotorEvent::Commanded { current_a, .. } => current_a.is_none_or(f64::is_finite),
     }

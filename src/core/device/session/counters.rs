@@ -144,7 +144,7 @@ impl LinkCounters {
     /// A row of the recording.
     pub(super) fn row(&self, sample: &Sample) -> Row {
         let [left, right] = &self.motors;
-        let voltage = |motor: &MotorCounters| motor.status.health.map(|health| health.voltage_v);
+        let voltage = |motor: &MotorCounters| motor.status.health.and_then(|health| health.voltage_v);
         let round_trip = |motor: &MotorCounters| motor.status.health?.round_trip;
         Row {
             sample: *sample,

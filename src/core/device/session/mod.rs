@@ -252,7 +252,7 @@ fn open_link(
         Source::Can { .. } | Source::Slcan { .. } => {
             let bus = open_bus(&options.source, listens, &clock)?;
             let imu = options.imu.as_ref().map(open_imu).transpose()?;
-            let wheels = Wheels::new(&options.robot.link);
+            let mut wheels = Wheels::new(&options.robot.link);
             let off = [MotorOrder::Torque([0.0; 2]), MotorOrder::Off];
             let farewell = off.iter().flat_map(|order| wheels.frames(order)).collect();
             Ok(Link::Wire(Wire::start(clock, bus, imu, farewell, Arc::clone(stop_line))?))
@@ -289,8 +289,8 @@ fn on_board(robot: &RobotModel) -> Result<Option<BalanceController>, ControlErro
 fn signals(described: &Described, options: &SessionOptions) -> Result<Signals, SessionError> {
     let refuse = |problem: String| SessionError::Dbc { file: described.file.clone(), problem };
     if options.mode != SessionMode::Listen {
-        let problem = "a robot described by a DBC file can only be monitored; driving needs the \
-                       LK protocol: leave the file out, or listen only";
+        let problem = "a robot described by a DBC file can only be monitored; driving needs a \
+                       motor protocol: leave the file out, or listen only";
         return Err(refuse(problem.to_owned()));
     }
     let text = files::read_text(&described.file, dbc::LARGEST_FILE_BYTES + 1)?;

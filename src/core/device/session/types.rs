@@ -183,7 +183,7 @@ pub struct SessionOptions {
     pub source: Source,
     /// IMU on a serial port of its own; an emulated or replayed robot has its IMU with it.
     pub imu: Option<SerialAddress>,
-    /// Another robot than one with LK motors and a JY901; it can be watched only.
+    /// A robot with another motor protocol than those of the program; it can be watched only.
     pub dbc: Option<Described>,
     /// The robot.
     pub robot: RobotModel,

@@ -14,12 +14,12 @@ fuzz_target!(|input: &[u8]| {
     let mut time = Duration::ZERO;
     for step in input.as_chunks::<12>().0 {
         let [id, direction, low, high, data @ ..] = *step;
-        if let Some(command) = Command::decode(data) {
+        if let Ok(command) = Command::decode(data) {
             assert_eq!(command.encode(), data);
         }
         for layout in [StateLayout::Current, StateLayout::Older] {
-            if let Some(reply) = Reply::decode(data, layout) {
-                assert_eq!(Reply::decode(reply.encode(), layout), Some(reply));
+            if let Ok(reply) = Reply::decode(data, layout) {
+                assert_eq!(Reply::decode(reply.encode(), layout), Ok(reply));
             }
         }
         time += Duration::from_micros(u64::from(u16::from_le_bytes([low, high])));

@@ -1,7 +1,7 @@
-//! Commands of an LK motor: encoding and decoding.
+//! Commands to a motor.
 
-use super::{MotorId, i16_at, i32_at, u16_at};
-use crate::link::Frame;
+use super::{MotorId, field, i16_at, u16_at, u32_at};
+use crate::link::{Frame, WireError};
 
 /// One command to one motor.
 ///
@@ -278,22 +278,31 @@ impl Command {
         }
     }
 
-    /// The command that has exactly these bytes; `None` if one that should be 0 is not, or where a field has no
-    /// such value.
-    pub fn decode(bytes: [u8; 8]) -> Option<Self> {
-        let command = Self::read(&bytes)?;
-        (command.encode() == bytes).then_some(command)
+    /// The command that has exactly these bytes.
+    ///
+    /// # Errors
+    /// [`WireError::UnknownCommand`], and [`WireError::InvalidField`] if a byte that should be 0 is not or a field has
+    /// no such value.
+    pub fn decode(bytes: [u8; 8]) -> Result<Self, WireError> {
+        let command = Self::read(&bytes).ok_or(WireError::UnknownCommand(bytes[field::COMMAND]))?;
+        match command.encode() == bytes {
+            true => Ok(command),
+            false => Err(WireError::InvalidField { command: bytes[field::COMMAND] }),
+        }
     }
 
     fn read(bytes: &[u8; 8]) -> Option<Self> {
-        let sense =
-            if bytes[1] == 1 { SenseOfRotation::Counterclockwise } else { SenseOfRotation::Clockwise };
-        let (long, middle) = (i32_at(bytes, 4), u16_at(bytes, 2));
-        Some(match bytes[0] {
+        let sense = match bytes[field::OPTION] {
+            1 => SenseOfRotation::Counterclockwise,
+            _ => SenseOfRotation::Clockwise,
+        };
+        let (value, limit) = (u32_at(bytes, field::VALUE), u16_at(bytes, field::LIMIT));
+        let current = i16_at(bytes, field::CURRENT);
+        Some(match bytes[field::COMMAND] {
             0x80 => Self::Off,
             0x88 => Self::On,
             0x81 => Self::Stop,
-            0x8C => Self::Brake(match bytes[1] {
+            0x8C => Self::Brake(match bytes[field::OPTION] {
                 0x00 => Brake::Engage,
                 0x01 => Brake::Release,
                 _ => Brake::Read,
@@ -302,22 +311,22 @@ impl Command {
             0x9B => Self::ClearErrors,
             0x9C => Self::ReadState2,
             0x9D => Self::ReadState3,
-            0xA0 => Self::OpenLoop { power: i16_at(bytes, 4) },
-            0xA1 => Self::TorqueCurrent { iq: i16_at(bytes, 4) },
-            0xA2 => Self::Speed { speed_cdps: long, iq_limit: middle.cast_signed() },
-            0xAD => Self::SpeedLimited { speed_cdps: long, iq_limit: middle.cast_signed() },
-            0xA3 => Self::Angle { angle_cdeg: long },
-            0xA4 => Self::AngleLimited { angle_cdeg: long, max_speed_dps: middle },
-            0xA5 => Self::TurnAngle { sense, angle_cdeg: long.cast_unsigned() },
-            0xA6 => Self::TurnAngleLimited { sense, angle_cdeg: long.cast_unsigned(), max_speed_dps: middle },
-            0xA7 => Self::Step { angle_cdeg: long },
-            0xA8 => Self::StepLimited { angle_cdeg: long, max_speed_dps: middle },
+            0xA0 => Self::OpenLoop { power: current },
+            0xA1 => Self::TorqueCurrent { iq: current },
+            0xA2 => Self::Speed { speed_cdps: value.cast_signed(), iq_limit: limit.cast_signed() },
+            0xAD => Self::SpeedLimited { speed_cdps: value.cast_signed(), iq_limit: limit.cast_signed() },
+            0xA3 => Self::Angle { angle_cdeg: value.cast_signed() },
+            0xA4 => Self::AngleLimited { angle_cdeg: value.cast_signed(), max_speed_dps: limit },
+            0xA5 => Self::TurnAngle { sense, angle_cdeg: value },
+            0xA6 => Self::TurnAngleLimited { sense, angle_cdeg: value, max_speed_dps: limit },
+            0xA7 => Self::Step { angle_cdeg: value.cast_signed() },
+            0xA8 => Self::StepLimited { angle_cdeg: value.cast_signed(), max_speed_dps: limit },
             0x90 => Self::ReadEncoder,
             0x92 => Self::ReadAngle,
             0x94 => Self::ReadTurnAngle,
-            0x95 => Self::SetAngle { angle_cdeg: long },
+            0x95 => Self::SetAngle { angle_cdeg: value.cast_signed() },
             0x19 => Self::WriteZero,
-            0x91 => Self::WriteOffset { offset: u16_at(bytes, 6) },
+            0x91 => Self::WriteOffset { offset: u16_at(bytes, field::OFFSET) },
             code => {
                 let [_, rest @ ..] = *bytes;
                 Self::Parameters { access: ParameterAccess::of(code)?, bytes: rest }

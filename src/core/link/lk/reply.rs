@@ -1,7 +1,7 @@
-//! What a motor answers.
+//! Replies of a motor.
 
-use super::{MotorId, i16_at, u16_at};
-use crate::link::{Frame, MotorErrors};
+use super::{MotorId, field, i16_at, u16_at, u32_at};
+use crate::link::{Frame, MotorErrors, WireError};
 use crate::model::StateLayout;
 
 /// One reply of one motor.
@@ -134,30 +134,31 @@ impl Reply {
         Frame::full(id, self.encode())
     }
 
-    /// The reply that these bytes are; none of a command that there is none of.
-    pub fn decode(bytes: [u8; 8], layout: StateLayout) -> Option<Self> {
-        let command = bytes[0];
-        Some(match command {
+    /// The reply that these bytes are.
+    ///
+    /// # Errors
+    /// [`WireError::UnknownCommand`].
+    pub fn decode(bytes: [u8; 8], layout: StateLayout) -> Result<Self, WireError> {
+        let command = bytes[field::COMMAND];
+        Ok(match command {
             0x9A | 0x9B => Self::State1 { command, state: State1::decode(&bytes, layout) },
             0x9C | 0xA0..=0xA8 | 0xAD => Self::State2 { command, state: State2::decode(&bytes) },
             0x9D => Self::State3(PhaseCurrents {
-                temperature_c: bytes[1].cast_signed(),
-                currents: [2, 4, 6].map(|at| i16_at(&bytes, at)),
+                temperature_c: bytes[field::TEMPERATURE].cast_signed(),
+                currents: field::PHASES.map(|at| i16_at(&bytes, at)),
             }),
-            0x8C => Self::Brake { state: bytes[1] },
+            0x8C => Self::Brake { state: bytes[field::BRAKE] },
             0x90 => Self::Encoder(Encoder {
-                position: u16_at(&bytes, 2),
-                raw: u16_at(&bytes, 4),
-                offset: u16_at(&bytes, 6),
+                position: u16_at(&bytes, field::POSITION),
+                raw: u16_at(&bytes, field::RAW),
+                offset: u16_at(&bytes, field::OFFSET),
             }),
             // Bytes 1 to 7 are the low 56 bits: shifted out and back, the sign comes along.
             0x92 => Self::Angle { angle_cdeg: i64::from_le_bytes(bytes) >> 8 },
-            0x94 => {
-                Self::TurnAngle { angle_cdeg: u32::from_le_bytes([bytes[4], bytes[5], bytes[6], bytes[7]]) }
-            }
-            0x19 | 0x91 => Self::Offset { command, offset: u16_at(&bytes, 6) },
+            0x94 => Self::TurnAngle { angle_cdeg: u32_at(&bytes, field::TURN_ANGLE) },
+            0x19 | 0x91 => Self::Offset { command, offset: u16_at(&bytes, field::OFFSET) },
             0x80 | 0x81 | 0x88 | 0x95 | 0xB0 | 0xB1 | 0xC0 | 0xC1 | 0x30..=0x34 => Self::Echo { bytes },
-            _ => return None,
+            _ => return Err(WireError::UnknownCommand(command)),
         })
     }
 
@@ -188,16 +189,19 @@ fn packed(command: u8, one: u8, rest: [u16; 3]) -> [u8; 8] {
 
 impl State1 {
     fn decode(bytes: &[u8; 8], layout: StateLayout) -> Self {
-        let (temperature_c, errors) = (bytes[1].cast_signed(), MotorErrors(bytes[7]));
+        let temperature_c = bytes[field::TEMPERATURE].cast_signed();
+        let errors = MotorErrors(u32::from(bytes[field::ERRORS]));
         match layout {
             StateLayout::Current => Self::Current {
                 temperature_c,
-                voltage_cv: i16_at(bytes, 2),
-                current_ca: i16_at(bytes, 4),
-                power: bytes[6],
+                voltage_cv: i16_at(bytes, field::VOLTAGE),
+                current_ca: i16_at(bytes, field::SUPPLY_CURRENT),
+                power: bytes[field::POWER],
                 errors,
             },
-            StateLayout::Older => Self::Older { temperature_c, voltage_dv: u16_at(bytes, 3), errors },
+            StateLayout::Older => {
+                Self::Older { temperature_c, voltage_dv: u16_at(bytes, field::OLDER_VOLTAGE), errors }
+            }
         }
     }
 
@@ -209,12 +213,12 @@ impl State1 {
                 [
                     voltage_cv.cast_unsigned(),
                     current_ca.cast_unsigned(),
-                    u16::from_le_bytes([power, errors.0]),
+                    u16::from_le_bytes([power, errors.0 as u8]),
                 ],
             ),
             Self::Older { temperature_c, voltage_dv, errors } => {
                 let [low, high] = voltage_dv.to_le_bytes();
-                [command, temperature_c.cast_unsigned(), 0, low, high, 0, 0, errors.0]
+                [command, temperature_c.cast_unsigned(), 0, low, high, 0, 0, errors.0 as u8]
             }
         }
     }
@@ -260,10 +264,10 @@ impl State1 {
 impl State2 {
     fn decode(bytes: &[u8; 8]) -> Self {
         Self {
-            temperature_c: bytes[1].cast_signed(),
-            iq: i16_at(bytes, 2),
-            speed_dps: i16_at(bytes, 4),
-            encoder: u16_at(bytes, 6),
+            temperature_c: bytes[field::TEMPERATURE].cast_signed(),
+            iq: i16_at(bytes, field::IQ),
+            speed_dps: i16_at(bytes, field::SPEED),
+            encoder: u16_at(bytes, field::ENCODER),
         }
     }
 

@@ -66,12 +66,12 @@ fn commands_are_the_bytes_of_the_papers() {
     ];
     for (command, hex) in table {
         assert_eq!(command.encode(), bytes(hex), "{command:?}");
-        assert_eq!(Command::decode(bytes(hex)), Some(command), "{hex}");
+        assert_eq!(Command::decode(bytes(hex)), Ok(command), "{hex}");
     }
 }
 
 #[test]
-fn bytes_that_are_no_command_are_told() {
+fn bytes_that_are_no_command_are_refused_with_the_reason() {
     for hex in [
         "A1 23 36 01 E1 FE 00 C0",
         "A1 01 00 00 84 01 00 00",
@@ -80,10 +80,18 @@ fn bytes_that_are_no_command_are_told() {
         "8C 02 00 00 00 00 00 00",
         "A5 02 00 00 00 00 00 00",
         "91 00 00 00 01 00 00 00",
-        "00 00 00 00 00 00 00 00",
-        "FF 00 00 00 00 00 00 00",
     ] {
-        assert_eq!(Command::decode(bytes(hex)), None, "{hex}");
+        let command = bytes(hex)[0];
+        assert_eq!(Command::decode(bytes(hex)), Err(WireError::InvalidField { command }), "{hex}");
+    }
+    for code in [0x00, 0xFF] {
+        let refused = Err(WireError::UnknownCommand(code));
+        assert_eq!(Command::decode([code, 0, 0, 0, 0, 0, 0, 0]), refused);
+        assert_eq!(Reply::decode([code; 8], StateLayout::Current), Err(WireError::UnknownCommand(code)));
+    }
+    for got in 0..8 {
+        let frame = Frame::data(motor(1).command_id(), &[0xA1; 8][..got]).unwrap();
+        assert_eq!(payload(&frame), Err(WireError::Truncated { needed: 8, got }));
     }
 }
 
@@ -123,11 +131,11 @@ fn replies_are_the_bytes_of_the_papers() {
     ];
     for (reply, hex) in table {
         assert_eq!(reply.encode(), bytes(hex), "{reply:?}");
-        assert_eq!(Reply::decode(bytes(hex), StateLayout::Current), Some(reply), "{hex}");
+        assert_eq!(Reply::decode(bytes(hex), StateLayout::Current), Ok(reply), "{hex}");
     }
     let hex = "9A FC 00 F0 01 00 00 01";
     assert_eq!(state1(0x9A, older).encode(), bytes(hex));
-    assert_eq!(Reply::decode(bytes(hex), StateLayout::Older), Some(state1(0x9A, older)));
+    assert_eq!(Reply::decode(bytes(hex), StateLayout::Older), Ok(state1(0x9A, older)));
     assert_eq!((older.voltage_v(), older.supply_current_a(), older.on()), (49.6, None, None));
     assert_eq!([0x00, 0x10, 0x20].map(|power| current(power).on()), [Some(true), Some(false), None]);
     assert_eq!((current(0).voltage_v(), current(0).supply_current_a()), (24.01, Some(-0.35)));
@@ -146,8 +154,8 @@ fn frames_go_to_and_come_from_the_right_identifiers() {
         (torques_frame([388, -388, 0, 0]), 0x280, Address::Torques),
     ] {
         assert_eq!(frame.id(), FrameId::Standard(id));
-        let bytes = frame.bytes().try_into().unwrap();
-        assert_eq!(address(&frame), Some((told, bytes)));
+        assert_eq!(address(&frame), Some(told));
+        assert_eq!(payload(&frame).unwrap(), frame.bytes());
     }
     assert_eq!((MotorId::new(0), MotorId::new(33)), (None, None));
 }
@@ -175,13 +183,13 @@ fn ten_million_random_and_flipped_bytes_are_read_without_harm() {
             let bit = random.next_u32() % 64;
             bytes[bit as usize / 8] ^= 1 << (bit % 8);
         }
-        if let Some(command) = Command::decode(bytes) {
+        if let Ok(command) = Command::decode(bytes) {
             assert_eq!(command.encode(), bytes);
             read[0] += 1;
         }
         for layout in [StateLayout::Current, StateLayout::Older] {
-            if let Some(reply) = Reply::decode(bytes, layout) {
-                assert_eq!(Reply::decode(reply.encode(), layout), Some(reply));
+            if let Ok(reply) = Reply::decode(bytes, layout) {
+                assert_eq!(Reply::decode(reply.encode(), layout), Ok(reply));
                 read[1] += 1;
             }
         }

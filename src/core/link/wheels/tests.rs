@@ -1,6 +1,10 @@
+use std::f64::consts::TAU;
+
 use super::*;
-use crate::link::{FrameId, MotorErrors, lk::ReplyId};
-use crate::model::{StateLayout, Turn};
+use crate::link::lk::{Command, Reply, ReplyId, State2};
+use crate::link::protocol::{Frames, MOST_FRAMES, MOST_REPORTS, Reports, TorqueRange};
+use crate::link::{FrameId, MotorErrors, MotorHealth};
+use crate::model::{StateLayout, TorqueCommand, Turn};
 
 fn sixteen_turns() -> LinkSettings {
     LinkSettings { torque_constant_nm_a: Some(0.32), ..LinkSettings::default() }
@@ -113,7 +117,7 @@ fn health_follows_the_layout_of_the_firmware() {
     let expected = MotorHealth {
         time: at_ms(1.0),
         temperature_c: 35.0,
-        voltage_v: 24.01,
+        voltage_v: Some(24.01),
         supply_current_a: Some(-0.35),
         on: Some(true),
         errors: MotorErrors(8),
@@ -129,7 +133,7 @@ fn health_follows_the_layout_of_the_firmware() {
     let events: Vec<_> = older.receive(&received(1.0, 0x141, bytes)).collect();
     let [MotorEvent::Health(Motor::Left, health)] = events[..] else { panic!("{events:?}") };
     let unknown = (health.supply_current_a, health.on);
-    assert_eq!((health.voltage_v, health.errors, unknown), (24.0, MotorErrors(1), (None, None)));
+    assert_eq!((health.voltage_v, health.errors, unknown), (Some(24.0), MotorErrors(1), (None, None)));
 }
 
 /// Readings of a shaft that turns as `angle_rad` and `speed_rad_s` say, in the left motor's own sense, one at each
@@ -146,7 +150,7 @@ fn follow(
     let sign = settings.left_direction.sign();
     for time_s in times_s {
         let encoder = (angle_rad(time_s) / TAU * steps).floor().rem_euclid(steps) as u16;
-        let dps = (speed_rad_s(time_s) / RAD_S_PER_DPS).round() as i16;
+        let dps = (speed_rad_s(time_s) / 1_f64.to_radians()).round() as i16;
         for event in wheels.receive(&received(time_s * 1e3, 0x181, reply(0xA1, state(25, 0, dps, encoder)))) {
             match event {
                 MotorEvent::State(_, state) => {
@@ -210,7 +214,7 @@ fn after_a_long_silence_the_angle_goes_on_from_the_last_one() {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Told {
     Asked(i16),
-    Commanded(u16),
+    Commanded(u32),
     State(i16),
     Health,
     Switched(bool),
@@ -379,7 +383,7 @@ fn one_command_of_another_controller_is_reported_whenever_it_comes() {
     let limited = [0xA6, 1, 0xF4, 0x01, 0x64, 0, 0, 0];
     let brake = [0x8C, 0, 0, 0, 0, 0, 0, 0];
     let off = [0x80, 0, 0, 0, 0, 0, 0, 0];
-    let others: [(u16, [u8; 8], u16); 9] = [
+    let others: [(u16, [u8; 8], u32); 9] = [
         (0x141, torque(0), 0xA1),
         (0x141, torque(300), 0xA1),
         (0x141, Command::Speed { speed_cdps: 0, iq_limit: 0 }.encode(), 0xA2),
@@ -539,4 +543,109 @@ fn the_round_trip_of_a_health_query_is_measured() {
     assert_eq!(trip(Some(10.0), 11.5), Some(at_ms(11.5) - at_ms(10.0)));
     assert_eq!(trip(Some(50.0), 65.0), Some(at_ms(65.0) - at_ms(50.0)));
     assert_eq!(trip(None, 70.0), None, "the query of somebody else");
+}
+
+/// Drives behind a gear that take the currents of both motors in one frame, have no command to switch on, and report
+/// unprompted.
+#[derive(Debug, Default)]
+struct GroupFrames {
+    switched: [Option<bool>; 2],
+}
+
+const GEAR: f64 = 3591.0 / 187.0;
+
+impl MotorProtocol for GroupFrames {
+    fn encode(&mut self, order: &MotorOrder) -> Frames {
+        let mut frames = [None; MOST_FRAMES];
+        match *order {
+            MotorOrder::On | MotorOrder::Off => self.switched = [Some(*order == MotorOrder::On); 2],
+            MotorOrder::Torque(torques_nm) => {
+                let [[a, b], [c, d]] = torques_nm.map(|nm| ((nm * 1000.0) as i16).to_be_bytes());
+                frames[0] = Some(Frame::full(FrameId::Standard(0x200), [a, b, c, d, 0, 0, 0, 0]));
+            }
+            MotorOrder::ReadState | MotorOrder::ReadHealth | MotorOrder::ClearErrors => {}
+        }
+        frames
+    }
+
+    fn decode(&mut self, frame: &StampedFrame) -> Reports {
+        let mut reports = [None; MOST_REPORTS];
+        let motor = match frame.frame.id().raw() {
+            0x201 => Motor::Left,
+            0x202 => Motor::Right,
+            _ => return reports,
+        };
+        let &[angle_high, angle_low, rpm_high, rpm_low, ..] = frame.frame.bytes() else { return reports };
+        let steps = u32::from(u16::from_be_bytes([angle_high, angle_low]));
+        let rotor_rad_s = f64::from(i16::from_be_bytes([rpm_high, rpm_low])) * TAU / 60.0;
+        reports[0] = Some(Report::Motion {
+            motor,
+            angle: ShaftAngle::WithinTurn { steps, turn_steps: 8192, turn_rad: TAU / GEAR },
+            speed_rad_s: rotor_rad_s / GEAR,
+            current_a: 0.0,
+            temperature_c: 25.0,
+        });
+        reports[1] = self.switched[motor as usize].take().map(|on| Report::Switched { motor, on });
+        reports
+    }
+
+    fn torque_range(&self) -> Result<TorqueRange, &'static str> {
+        Ok(TorqueRange { max_nm: 32.767, step_nm: 0.001 })
+    }
+
+    fn longest_silence(&self) -> Duration {
+        Duration::from_millis(5)
+    }
+}
+
+#[test]
+fn group_frames_and_geared_drives_that_report_unprompted_fit() {
+    let settings = LinkSettings::default();
+    let mut wheels = Wheels::with_protocol(Box::<GroupFrames>::default(), &settings);
+    let frames: Vec<Frame> = wheels.frames(&MotorOrder::Torque([0.5, 0.5])).collect();
+    let [both] = frames[..] else { panic!("{frames:?}") };
+    assert_eq!(both.bytes()[..4], [0x01, 0xF4, 0xFE, 0x0C], "0.5 N m forward in each motor's own sense");
+    assert_eq!(wheels.frames(&MotorOrder::On).count() + wheels.frames(&MotorOrder::ReadState).count(), 0);
+
+    // 8000 rpm of the rotor for 30 ms: 4 turns of it, 4/19.2 of a turn at the wheel.
+    let rpm = 8000_i16;
+    let mut last = None;
+    for tick in 0..=30_u32 {
+        let steps = (f64::from(tick) * 8192.0 * 8000.0 / 60_000.0).round() as u32 % 8192;
+        let [a, b] = (steps as u16).to_be_bytes();
+        let [c, d] = rpm.to_be_bytes();
+        let frame = received(f64::from(tick), 0x202, [a, b, c, d, 0, 0, 25, 0]);
+        let events: Vec<MotorEvent> = wheels.receive(&frame).collect();
+        assert_eq!(events.len(), if tick == 0 { 2 } else { 1 }, "{events:?}");
+        assert!(events[1..].iter().all(|event| matches!(event, MotorEvent::Switched { on: true, .. })));
+        if let MotorEvent::State(motor, state) = events[0] {
+            last = Some((motor, state.angle_rad, state.speed_rad_s));
+        }
+    }
+    let (motor, angle_rad, speed_rad_s) = last.unwrap();
+    assert_eq!(motor, Motor::Right);
+    assert!((angle_rad + 4.0 * TAU / GEAR).abs() < 1e-4, "{angle_rad}");
+    assert!((speed_rad_s + 8000.0 * TAU / 60.0 / GEAR).abs() < 1e-9, "{speed_rad_s}");
+    // 6 ms of silence are more than half a turn of the rotor.
+    let late = wheels.receive(&received(36.0, 0x202, [0; 8]));
+    assert!(late.into_iter().any(|event| matches!(event, MotorEvent::TurnsLost { .. })));
+}
+
+#[test]
+fn angles_that_a_drive_counts_itself_start_at_zero() {
+    let settings = LinkSettings::default();
+    let mut wheels = Wheels::new(&settings);
+    let angles = [7.5, 8.0, -20.0].map(|rad| {
+        let angle = ShaftAngle::Continuous(rad);
+        wheels.count(Motor::Left, angle, Duration::ZERO, 0.0)
+    });
+    assert_eq!(angles, [(0.0, None), (0.5, None), (-27.5, None)]);
+}
+
+#[test]
+fn the_range_of_torques_is_that_of_the_command() {
+    let range = |settings: &LinkSettings| (protocol(settings.protocol).host)(settings).torque_range();
+    let TorqueRange { max_nm, step_nm } = range(&sixteen_turns()).unwrap();
+    assert!((max_nm - 5.28).abs() < 1e-9 && (step_nm - 0.002_578).abs() < 1e-6, "{max_nm} {step_nm}");
+    assert!(range(&LinkSettings::default()).unwrap_err().contains("torque_constant_nm_a"));
 }

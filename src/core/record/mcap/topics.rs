@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::protobuf::{File, Kind, MessageType, descriptor_set};
 use crate::link::jy901::{Packet, Reading};
+use crate::record::schema;
 
 /// A message type as a channel names it.
 pub(super) struct Schema {
@@ -59,19 +60,7 @@ pub(super) fn log() -> Schema {
 
 /// Topic and field of a log's column; columns of no robot log go to the topic `rest`.
 pub(super) fn of_column<'a>(column: &'a str, rest: &'a str) -> (&'a str, &'a str) {
-    match column {
-        "x_m" | "x_dot_m_s" | "pitch_rad" | "pitch_rate_rad_s" => ("/state", column),
-        "motor_angle_left_rad" => ("/motors/left", "angle_rad"),
-        "motor_speed_left_rad_s" => ("/motors/left", "speed_rad_s"),
-        "torque_left_nm" => ("/motors/left", "torque_nm"),
-        "motor_temperature_left_c" => ("/motors/left", "temperature_c"),
-        "motor_angle_right_rad" => ("/motors/right", "angle_rad"),
-        "motor_speed_right_rad_s" => ("/motors/right", "speed_rad_s"),
-        "torque_right_nm" => ("/motors/right", "torque_nm"),
-        "motor_temperature_right_c" => ("/motors/right", "temperature_c"),
-        "bus_voltage_v" => ("/supply", "voltage_v"),
-        _ => (rest, column),
-    }
+    schema::topic(column).unwrap_or((rest, column))
 }
 
 /// Name of the message type of a topic, such as `MotorsLeft`.

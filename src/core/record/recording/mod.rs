@@ -14,13 +14,16 @@
 mod frame_log;
 mod frames;
 mod names;
+mod row;
 mod text;
 
 pub use frame_log::FrameLog;
 pub use frames::{imu_packet, push_frame, push_imu_packet};
 pub use names::Names;
+pub use row::Row;
+pub(super) use row::{OPTIONAL_COLUMNS, ROW_COLUMNS};
 pub use text::{
-    About, Row, bench_header, parse_event, parse_start, push_bench_row, push_event, push_row, robot_header,
+    About, bench_header, parse_event, parse_start, push_bench_row, push_event, push_row, robot_header,
 };
 
 #[cfg(test)]
@@ -31,7 +34,3 @@ pub const FIRST_LINE: &str = "# flqr recording";
 
 /// Interface under which packets of the IMU stand among the frames.
 pub const IMU_INTERFACE: &str = "imu";
-
-/// Columns of a recording's robot log behind [`super::Sample::COLUMNS`].
-pub const OPTIONAL_COLUMNS: [&str; 4] =
-    ["motor_temperature_left_c", "motor_temperature_right_c", "bus_voltage_v", "round_trip_s"];

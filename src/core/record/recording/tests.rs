@@ -32,7 +32,7 @@ fn row(number: u32) -> Row {
     let warm = (number >= 2).then_some(35.0);
     let bus_voltage_v = number.is_multiple_of(2).then_some(24.01);
     let round_trip_s = number.is_multiple_of(5).then_some(0.000_25);
-    Row { sample: sample(number), motor_temperature_c: [warm, None], bus_voltage_v, round_trip_s }
+    Row::new(sample(number), [warm, None, bus_voltage_v, round_trip_s])
 }
 
 fn robot_log(rows: u32) -> String {
@@ -67,9 +67,7 @@ fn recorded_rows_read_back_to_the_same_bits() {
     assert_eq!((log.kind(), log.rows(), log.problem_count), (Ok(LogKind::Robot), 6, 0));
     for number in 0..6 {
         let written = row(number);
-        let [left, right] = written.motor_temperature_c;
-        let optional = [left, right, written.bus_voltage_v, written.round_trip_s];
-        let cells = written.sample.to_row().map(Some).into_iter().chain(optional);
+        let cells = written.sample.to_row().map(Some).into_iter().chain(written.optional());
         for (name, cell) in Row::columns().zip(cells) {
             let found = log.column(name).unwrap()[number as usize];
             assert!(cell.map_or(found.is_nan(), |value| value.to_bits() == found.to_bits()), "{name}");

@@ -3,9 +3,9 @@
 use std::fmt::Write;
 use std::time::Duration;
 
-use super::{FIRST_LINE, OPTIONAL_COLUMNS};
+use super::{FIRST_LINE, Row};
 use crate::model::Motor;
-use crate::record::{BenchSample, Sample, write::push_number};
+use crate::record::{BenchSample, write::push_number};
 
 /// Source of a recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -16,32 +16,6 @@ pub struct About {
     pub interface: String,
     /// Start of the session, since 1970.
     pub start: Duration,
-}
-
-/// A row of a recording's robot log.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Row {
-    /// Measured and commanded signals.
-    pub sample: Sample,
-    /// Newest temperature of the left and the right motor, °C.
-    pub motor_temperature_c: [Option<f64>; 2],
-    /// Newest voltage of the supply, V.
-    pub bus_voltage_v: Option<f64>,
-    /// Newest time from a query of a motor to its reply, of the slower motor, s.
-    pub round_trip_s: Option<f64>,
-}
-
-impl Row {
-    /// Names of the columns of a recording's robot log.
-    pub fn columns() -> impl Iterator<Item = &'static str> {
-        Sample::COLUMNS.into_iter().chain(OPTIONAL_COLUMNS)
-    }
-}
-
-impl From<Sample> for Row {
-    fn from(sample: Sample) -> Self {
-        Self { sample, motor_temperature_c: [None; 2], bus_voltage_v: None, round_trip_s: None }
-    }
 }
 
 /// Header of the robot log.
@@ -74,9 +48,7 @@ pub fn parse_start(comment: &str) -> Option<Duration> {
 
 /// Adds a row to the robot log.
 pub fn push_row(text: &mut String, row: &Row) {
-    let [left, right] = row.motor_temperature_c;
-    let optional = [left, right, row.bus_voltage_v, row.round_trip_s];
-    push_cells(text, row.sample.to_row().map(Some).into_iter().chain(optional));
+    push_cells(text, row.sample.to_row().map(Some).into_iter().chain(row.optional()));
 }
 
 /// Adds a row to the bench log of a motor.

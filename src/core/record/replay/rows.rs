@@ -73,10 +73,8 @@ impl<R: BufRead> RowTrack<R> {
         let item = match self.rows.next_item() {
             Ok(Some(LogItem::Row(values))) => {
                 let cell = |place: Option<usize>| place.map(|at| values[at]).filter(|value| !value.is_nan());
-                let [left, right, bus_voltage_v, round_trip_s] = optional.map(cell);
                 let sample = Sample::from_row(self.columns.map(|at| values[at]));
-                let row = Row { sample, motor_temperature_c: [left, right], bus_voltage_v, round_trip_s };
-                (sample.time_s, ReplayItem::Row(row))
+                (sample.time_s, ReplayItem::Row(Row::new(sample, optional.map(cell))))
             }
             Ok(Some(LogItem::Event(time, text))) => (time.as_secs_f64(), ReplayItem::Event(text)),
             Ok(None) => return,

@@ -4,8 +4,6 @@
 //! The recorded motion, smoothed, is the true one; the effort that it takes is worked out, both are measured anew. So
 //! nothing has to be tracked, and the columns of the library stay as they are but for noise that none of them shows.
 
-use std::num::NonZeroUsize;
-
 use crate::friction::Stribeck;
 use crate::parallel;
 use crate::refine::{largest::exceeded_by, whiten::Whitener};
@@ -20,7 +18,6 @@ use super::trace::{Part, Rows, second_difference};
 const RUNS: u64 = 24;
 /// Share of clean motors that the threshold lets through.
 const LEVEL: f64 = 0.01;
-const THREADS: NonZeroUsize = NonZeroUsize::new(2).expect("two");
 
 /// The fitted model and the noise of its log.
 pub(super) struct Clean {
@@ -62,7 +59,7 @@ pub(super) fn thresholds(
         .collect();
     let gram = search.raw_gram(candidates);
     let runs: Vec<u64> = (0..RUNS).collect();
-    let found = parallel::map(&runs, THREADS, |run| {
+    let found = parallel::map(&runs, parallel::available(), |run| {
         let mut noise = Noise::new(clean.seed, *run);
         let measured: Vec<Vec<f64>> = rows
             .traces

@@ -2,7 +2,7 @@
 
 use super::normal::Normal;
 use crate::effects::{self, Action, EffectKind, Law, Machine, MotionSample, Parameter, Role};
-use crate::model::{AxisParameters, MachineKind, Model, Motor, Rig};
+use crate::model::{AxisParameters, MachineKind, Model, ModelParameter, Motor, ParameterPlace, Rig};
 use crate::record::Log;
 use crate::refine::{
     prediction::moments,
@@ -12,15 +12,14 @@ use crate::refine::{
 
 /// Rows over which residuals are averaged, s.
 const ROW_S: f64 = 0.01;
-/// Declared numbers that are free within their tolerances, as effects, and their keys on a robot, a shaft and a
-/// carriage.
-const FREE: [(&str, [&str; 3]); 6] = [
-    ("coulomb_error", ["coulomb_nm", "coulomb_nm", "coulomb_n"]),
-    ("viscous_error", ["viscous_nm_s_rad", "viscous_nm_s_rad", "viscous_n_s_m"]),
-    ("inertia_error", ["wheel_inertia_kg_m2", "inertia_kg_m2", "mass_kg"]),
-    ("mass_error", ["body_mass_kg", "inertia_kg_m2", "mass_kg"]),
-    ("com_height_error", ["com_height_m"; 3]),
-    ("body_inertia_error", ["body_inertia_kg_m2"; 3]),
+/// Effects that stand for errors of declared numbers, which are free within their tolerances.
+const FREE: [&str; 6] = [
+    "coulomb_error",
+    "viscous_error",
+    "inertia_error",
+    "mass_error",
+    "com_height_error",
+    "body_inertia_error",
 ];
 
 /// Moments of a run of the robot on its wheels, or of one shaft.
@@ -68,19 +67,20 @@ impl<'a> View<'a> {
                 (None, Machine::axis(axis), friction)
             }
         };
-        let p = shaft.parameters;
+        let mut p = shaft.parameters;
         let curve = curve.map(|curve| *curve.parameters());
         let kind = if ground.is_some() { MachineKind::Robot } else { shaft.kind };
         let (mut free, mut tolerances) = (Vec::new(), Vec::new());
-        for (id, keys) in FREE {
-            let share = model.tolerance.share_of(keys[kind as usize]);
-            let size = match id {
-                "coulomb_error" => curve.map_or(0.01, |c| c.coulomb_nm),
-                "viscous_error" => curve.map_or(1e-3, |c| c.viscous_nm_s_rad),
-                "inertia_error" => p.wheel_inertia_kg_m2,
-                "mass_error" => p.body_mass_kg,
-                "com_height_error" => p.com_height_m,
-                _ => p.body_inertia_kg_m2,
+        for id in FREE {
+            let Some(declared) = ModelParameter::of_effect(id, kind) else { continue };
+            let share = model.tolerance.share_of(declared.key);
+            let size = match ModelParameter::of_effect(id, MachineKind::Robot).map(|row| row.place) {
+                Some(ParameterPlace::Friction(place)) => {
+                    let unknown = if id == "coulomb_error" { 0.01 } else { 1e-3 };
+                    curve.map_or(unknown, |mut curve| *place(&mut curve))
+                }
+                Some(ParameterPlace::Robot(place)) => *place(&mut p),
+                Some(ParameterPlace::Axis) | None => continue,
             };
             if let Some(effect) = effects::kind(id).filter(|effect| effect.is_on(kind)) {
                 free.push(effect);

@@ -45,7 +45,7 @@ pub(super) fn shifts(
     let seeds: Vec<u64> =
         (1..=ROBOTS).map(|robot| seed.wrapping_mul(ROBOTS + 7).wrapping_sub(robot)).collect();
     let found: Vec<Vec<f64>> =
-        parallel::map(&seeds, super::THREADS, |&seed| refitted(&known, twin, levels, seed))
+        parallel::map(&seeds, parallel::available(), |&seed| refitted(&known, twin, levels, seed))
             .into_iter()
             .flatten()
             .collect();

@@ -23,7 +23,7 @@ const LEAST_SCALE: f64 = 0.1;
 pub(super) fn largest_gain(twin: &Twin<'_>, levels: Levels, seed: u64) -> f64 {
     let seeds: Vec<u64> =
         (1..=ROBOTS).map(|robot| seed.wrapping_mul(ROBOTS + 1).wrapping_add(robot)).collect();
-    let gains = parallel::map(&seeds, super::THREADS, |&seed| largest(twin, levels, seed));
+    let gains = parallel::map(&seeds, parallel::available(), |&seed| largest(twin, levels, seed));
     exceeded_by(&gains.into_iter().flatten().collect::<Vec<_>>(), LEVEL, LEAST_SCALE)
 }
 

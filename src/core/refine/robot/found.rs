@@ -1,7 +1,7 @@
 //! From picks to effects with sizes, intervals and what they cannot be told from.
 
 use crate::effects::{EffectKind, Form, KINDS, Role, Term};
-use crate::model::{Effect, MachineKind, Model, Rig};
+use crate::model::{Effect, MachineKind, Model, ModelParameter, Rig};
 use crate::refine::verdict::{Corrected, Found};
 use crate::signal::quantile::student_t_975;
 
@@ -195,11 +195,10 @@ pub(super) fn refined(
     }
     let value = |key: &str| parameters.iter().find(|p| p.key == key).map(|p| p.value);
     let mut numbers = robot.parameters;
-    numbers.body_mass_kg = value("body_mass_kg").unwrap_or(numbers.body_mass_kg);
-    numbers.com_height_m = value("com_height_m").unwrap_or(numbers.com_height_m);
-    numbers.body_inertia_kg_m2 = value("body_inertia_kg_m2").unwrap_or(numbers.body_inertia_kg_m2);
-    numbers.wheel_inertia_kg_m2 = value("wheel_inertia_kg_m2").unwrap_or(numbers.wheel_inertia_kg_m2);
-    numbers.wheel_mass_kg = value("wheel_mass_kg").unwrap_or(numbers.wheel_mass_kg);
+    for (row, place) in ModelParameter::of_robot() {
+        let number = place(&mut numbers);
+        *number = value(row.key).unwrap_or(*number);
+    }
     if numbers.validate().is_ok() {
         robot.set_parameters(numbers);
     }

@@ -29,10 +29,9 @@ mod twin;
 mod uncertainty;
 mod waves;
 
-use std::num::NonZeroUsize;
-
 use crate::effects::{EffectKind, Form, MotionSample as Moment};
-use crate::model::{Model, RobotModel};
+use crate::model::{Model, ModelParameter, RobotModel};
+use crate::parallel;
 use crate::record::{HealthFinding, Log, LogKind};
 use crate::signal::quantile::student_t_975;
 
@@ -46,7 +45,7 @@ use candidates::library;
 use channels::Channels;
 use motion::Readings;
 pub(super) use motion::{at_even_times, fresh_rows};
-use nuisance::{KEYS, Known, Nuisance, nuisances};
+use nuisance::{Known, Nuisance, nuisances};
 use search::{Fit, Search, whitened};
 use trace::{Pair, Part, Trace};
 use twin::{Levels, Twin};
@@ -56,9 +55,6 @@ const EXPLAINED: f64 = 0.95;
 /// The same where no more than so much of the noise's power is left.
 const MOST_OF_IT: f64 = 0.5;
 const LITTLE: f64 = 0.1;
-
-/// Threads that share the work; no answer depends on them.
-const THREADS: NonZeroUsize = NonZeroUsize::new(4).expect("four");
 
 /// How far a model is from logs of its robot.
 pub(super) fn residual(
@@ -161,13 +157,13 @@ pub(super) fn refine(
         let done = if is_last { 0.55 } else { 0.1 };
         report(watch, done)?;
         let target = trace.residual();
-        let (mut free, mut tried) = (nuisances(&trace, known), library(&trace, THREADS));
+        let (mut free, mut tried) = (nuisances(&trace, known), library(&trace, parallel::available()));
         tried.retain(|candidate| moves && !banned.contains(&candidate.kind));
-        whitened(&mut tried, &mut free, &channels, THREADS);
+        whitened(&mut tried, &mut free, &channels, parallel::available());
         let by_chance =
             || *chance.get_or_init(|| by_chance(&trace, &channels, &free, &target, (known, options.seed)));
         let mut search = Search::new(&trace, &channels, &free, &tried, &target, &by_chance);
-        search.threads = THREADS;
+        search.threads = parallel::available();
         search.run(&mut |share| report(watch, done + 0.4 * share))?;
         search.settle();
         if is_last {
@@ -254,8 +250,9 @@ fn unbiased(search: &Search<'_>, mut fit: Fit, known: Known<'_>, seed: u64) -> F
 }
 
 fn check_names(names: &[String]) -> Result<(), RefineError> {
-    match names.iter().find(|name| *name != "all" && !KEYS.contains(&name.as_str())) {
-        Some(name) => Err(RefineError::UnknownParameter { name: name.clone(), allowed: KEYS.join(", ") }),
+    let keys: Vec<&str> = ModelParameter::refined_on_robot().collect();
+    match names.iter().find(|name| *name != "all" && !keys.contains(&name.as_str())) {
+        Some(name) => Err(RefineError::UnknownParameter { name: name.clone(), allowed: keys.join(", ") }),
         None => Ok(()),
     }
 }

@@ -2,23 +2,10 @@
 
 use crate::effects::{Action, EffectKind, Form, KINDS, MotionSample as Moment};
 use crate::friction::StribeckParameters;
-use crate::model::Tolerances;
+use crate::model::{ModelParameter, Tolerances};
 use crate::refine::select::Member;
 
 use super::trace::{Pair, Trace};
-
-/// Every key that a robot's numbers may be freed by.
-pub(super) const KEYS: [&str; 9] = [
-    "body_mass_kg",
-    "com_height_m",
-    "body_inertia_kg_m2",
-    "wheel_inertia_kg_m2",
-    "wheel_mass_kg",
-    "coulomb_nm",
-    "static_nm",
-    "viscous_nm_s_rad",
-    "offset_nm",
-];
 
 /// How well the declared numbers are known: their tolerances, and those that are free.
 #[derive(Clone, Copy)]
@@ -120,13 +107,12 @@ pub(super) fn nuisances(trace: &Trace, known: Known<'_>) -> Vec<Nuisance> {
         let kind = KINDS.iter().find(|kind| kind.id == id).expect("the library has the parameters' errors");
         trace.columns(kind, Form::Law, &[]).swap_remove(0)
     };
-    for (key, declared, effect) in [
-        ("body_mass_kg", p.body_mass_kg, &["mass_error"]),
-        ("com_height_m", p.com_height_m, &["com_height_error"]),
-        ("body_inertia_kg_m2", p.body_inertia_kg_m2, &["body_inertia_error"]),
-        ("wheel_inertia_kg_m2", p.wheel_inertia_kg_m2, &["inertia_error"]),
-    ] {
-        add(key, declared, [known.share_of(key) * declared, 0.0], effect, of_kind(effect[0]));
+    let mut declared = p;
+    for (row, place) in ModelParameter::of_robot() {
+        let Some(effect) = &row.effect else { continue };
+        let value = *place(&mut declared);
+        let tolerance = known.share_of(row.key) * value;
+        add(row.key, value, [tolerance, 0.0], std::slice::from_ref(effect), of_kind(effect));
     }
     let wheels = trace.pair(|| |m: &Moment| Action::force(-2.0 * m.x_accel_m_s2, 0.0, 0.0));
     let tolerance = known.share_of("wheel_mass_kg") * p.wheel_mass_kg;

@@ -10,7 +10,7 @@ use nalgebra::{Matrix2, Matrix4};
 
 use crate::effects::{Declared, EffectKind, Law, MotionSample as Moment, Place, Term};
 use crate::lqr::{self};
-use crate::model::{Effect, MachineKind, RobotModel, RobotParameters, State, Weights};
+use crate::model::{Effect, MachineKind, ModelParameter, RobotModel, State, Weights};
 use crate::simulate::{Forcing, Noise, PlanarPlant};
 
 use super::channels::Channels;
@@ -52,15 +52,11 @@ impl<'a> Twin<'a> {
         let value = |key: &str, declared: f64| {
             corrections.iter().find(|(n, _)| n.key == key).map_or(declared, |(n, off)| n.corrected(*off))
         };
-        let p = robot.parameters;
-        let corrected = RobotParameters {
-            body_mass_kg: value("body_mass_kg", p.body_mass_kg),
-            com_height_m: value("com_height_m", p.com_height_m),
-            body_inertia_kg_m2: value("body_inertia_kg_m2", p.body_inertia_kg_m2),
-            wheel_inertia_kg_m2: value("wheel_inertia_kg_m2", p.wheel_inertia_kg_m2),
-            wheel_mass_kg: value("wheel_mass_kg", p.wheel_mass_kg),
-            ..p
-        };
+        let mut corrected = robot.parameters;
+        for (row, place) in ModelParameter::of_robot() {
+            let number = place(&mut corrected);
+            *number = value(row.key, *number);
+        }
         if corrected.validate().is_ok() {
             robot.parameters = corrected;
         }

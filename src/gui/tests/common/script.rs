@@ -129,10 +129,10 @@ pub(crate) fn health(voltage_v: f64, errors: u8) -> MotorHealth {
     MotorHealth {
         time: Duration::ZERO,
         temperature_c: 41.0,
-        voltage_v,
+        voltage_v: Some(voltage_v),
         supply_current_a: None,
         on: Some(true),
-        errors: MotorErrors(errors),
+        errors: MotorErrors(u32::from(errors)),
         round_trip: None,
     }
 }

@@ -223,7 +223,7 @@ impl Rig {
             MotorHealth {
                 time: self.now(),
                 temperature_c: 35.0,
-                voltage_v,
+                voltage_v: Some(voltage_v),
                 supply_current_a: Some(0.1),
                 on: Some(self.on[motor as usize] && !off),
                 errors,
