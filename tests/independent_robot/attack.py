@@ -340,7 +340,7 @@ def disturbance_of(scenario, result):
     late = result.robot["worst_lateness_s"]
     if late > LATENESS_S:
         return f"the emulated robot itself was late by {1000 * late:.0f} ms"
-    if scenario.has_fault() and result.was_early and result.stopped_by in BUSY_STOPS:
+    if scenario.has_fault() and result.was_early and result.stopped_by in (None, *BUSY_STOPS):
         return f"stopped before the fault: {result.end.get('text')}"
     if result.stopped_by in BUSY_STOPS and not scenario.busy and not scenario.breaks_the_link():
         return f"stopped for another reason than the fault: {result.end.get('text')}"

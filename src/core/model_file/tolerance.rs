@@ -109,7 +109,7 @@ mod tests {
             (SHAFT, "friction = 20", "a fraction from 0 to 1"),
             (SHAFT, "friction = \"high\"", "is not a number"),
             (SHAFT, "body_mass_kg = 0.1", "unknown key `body_mass_kg`"),
-            (RAIL, "coulomb_nm = 0.1", "use masses, mass_kg, friction, coulomb_n"),
+            (RAIL, "coulomb_nm = 0.1", "use masses, mass_kg, friction, stribeck_exponent, coulomb_n"),
         ] {
             let error = Model::from_toml(&format!("{text}[tolerance]\n{key}\n"), "m.toml").unwrap_err();
             assert!((error.line, error.problem.contains(part)) == (6, true), "{error} ({part})");
