@@ -374,7 +374,7 @@ impl App {
         }
         match now {
             Stage::Listening => self.say("Listening: nothing is sent."),
-            Stage::Checking => self.say("Checking: the querying the motors, without torque."),
+            Stage::Checking => self.say("Checking: querying the motors, without torque."),
             Stage::Driving => self.say("Driving: Esc and Space stop the robot."),
             Stage::Stopped(reason) => self.fail(format!("Stopped: {reason}.")),
         }

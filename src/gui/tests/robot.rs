@@ -157,6 +157,7 @@ fn arming_takes_two_steps_and_all_checks() {
         assert_eq!(script.drive_orders(), [], "{result:?}");
         assert_eq!(state(&window)["robot_tab"]["may_arm"], false);
     }
+    assert_eq!(state(&window)["message"], "Checking: querying the motors, without torque.");
     tell(&mut window, &script, at_stage(0.4, Stage::Checking, &[]));
     assert_eq!(state(&window)["robot_tab"]["may_arm"], false, "nothing has been checked");
     tell(&mut window, &script, at_stage(0.5, Stage::Checking, GOOD));
