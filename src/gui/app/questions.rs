@@ -409,9 +409,9 @@ fn leave_driven_ui(ui: &mut Ui) -> Reply {
 
 fn gains_ui(changes: &[GainChange], ui: &mut Ui) -> Reply {
     ui.heading("Apply these gains to the robot being driven?");
-    ui.label(format!("They change by more than a factor of {LARGEST_FACTOR}:"));
+    ui.label(format!("They differ by more than a factor of {LARGEST_FACTOR} from the last confirmed gains:"));
     Grid::new("large changes").num_columns(4).striped(true).spacing([24.0, 3.0]).show(ui, |ui| {
-        for head in ["gain", "robot", "design", "change"] {
+        for head in ["gain", "confirmed", "design", "change"] {
             hint_ui(ui, head);
         }
         ui.end_row();

@@ -106,6 +106,10 @@ fn live_gains_follow_up_to_a_factor_of_2_from_those_that_were_agreed_to() {
     }
     assert!((1.7..=2.0).contains(&(last / start)), "{}", last / start);
     assert_eq!(gains(&window)["pending"], "ask");
+    // The question compares with the gains at arming, which are no longer those of the robot.
+    click(&mut window, "Apply to robot");
+    window.get_by_label("confirmed");
+    window.get_by_label_contains("from the last confirmed gains");
 }
 
 #[test]
