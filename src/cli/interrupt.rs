@@ -4,6 +4,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
 use std::time::Duration;
 
+use flqr_core::device::abandon_replacements;
+
 use super::output::Failure;
 
 /// Timeout for the motors to confirm that they are off before the program ends or is suspended.
@@ -87,6 +89,12 @@ fn stop_robots() {
     }
 }
 
+/// Stops every robot and removes temporary files before `end` ends the program.
+fn end(end: impl FnOnce()) {
+    stop_robots();
+    abandon_replacements(end);
+}
+
 #[cfg(unix)]
 mod system {
     use std::io;
@@ -100,7 +108,7 @@ mod system {
     use signal_hook::iterator::Signals;
     use signal_hook::low_level::{emulate_default_handler, signal_name};
 
-    use super::{Duty, Interrupt, stop_robots};
+    use super::{Duty, Interrupt, end, stop_robots};
 
     /// Signals that suspend the program.
     const SUSPEND: [i32; 3] = [SIGTSTP, SIGTTIN, SIGTTOU];
@@ -142,8 +150,7 @@ mod system {
         } else if interrupt.raise(signal) && duty != Duty::Window {
             flqr_core::device::stop_all();
         } else {
-            stop_robots();
-            emulate(signal);
+            end(|| emulate(signal));
         }
     }
 
@@ -161,20 +168,44 @@ mod system {
 
 #[cfg(not(unix))]
 mod system {
-    use super::{Duty, Interrupt, stop_robots};
+    use super::{Duty, Interrupt, end};
 
     pub(super) fn watch(duty: Duty, interrupt: Interrupt) -> Result<(), ctrlc::Error> {
         ctrlc::set_handler(move || {
             if interrupt.raise(1) && duty != Duty::Window {
                 flqr_core::device::stop_all();
             } else {
-                stop_robots();
-                std::process::exit(1);
+                end(|| std::process::exit(1));
             }
         })
     }
 
     pub(super) fn name(_: i32) -> &'static str {
         "Ctrl+C"
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+    use std::io::{Error, Write};
+
+    use flqr_core::device::replace_file;
+
+    #[test]
+    fn no_temporary_file_remains_when_a_signal_ends_the_program() {
+        let folder = std::env::temp_dir().join(format!("flqr-interrupt-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        let count = || fs::read_dir(&folder).unwrap().count();
+        let mut counts = Vec::new();
+        let replaced = replace_file(&folder.join("model.toml"), |file| {
+            file.write_all(b"half of the new")?;
+            counts.push(count());
+            super::end(|| counts.push(count()));
+            Err(Error::other("the program has ended"))
+        });
+        assert!(replaced.is_err());
+        assert_eq!(counts, [1, 0], "while the file is written, and at the end of the program");
+        fs::remove_dir_all(&folder).unwrap();
     }
 }
