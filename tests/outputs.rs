@@ -309,6 +309,38 @@ fn an_empty_home_is_reported() {
     assert!(message.contains("HOME is empty or not set: set it to a folder"), "{message}");
 }
 
+/// The window would replace the file again and again: it refuses to open.
+#[test]
+fn the_state_of_the_window_replaces_neither_inputs_nor_other_files() {
+    let folder = Folder::new("state-out");
+    folder.done(&format!("{SIMULATE} --log run.csv"));
+    fs::write(folder.path("notes.json"), "{\n  \"about\": \"my notes\"\n}\n").unwrap();
+    fs::write(
+        folder.path("earlier.json"),
+        "{\n  \"about\": \"flqr window state\",\n  \"tab\": \"tune\"\n}\n",
+    )
+    .unwrap();
+    fs::write(folder.path("session.json"), "{}").unwrap();
+    let before: Vec<_> = folder.names().iter().map(|name| fs::read(folder.path(name)).unwrap()).collect();
+    for (line, problem) in [
+        ("--model model.toml --state-out model.toml --force", "would overwrite an input file"),
+        ("--log run.csv --state-out ./run.csv --force", "would overwrite an input file"),
+        ("--session session.json --state-out session.json --force", "would overwrite an input file"),
+        ("--source replay:run.csv --state-out run.csv --force", "would overwrite an input file"),
+        ("--state-out notes.json", "not written by flqr"),
+        ("--state-out absent/state.json", "cannot write the window state"),
+        // Nothing is wrong but that there is no display.
+        ("--state-out notes.json --force", "needs a display"),
+        ("--state-out earlier.json", "needs a display"),
+        ("--state-out new.json", "needs a display"),
+    ] {
+        let message = folder.refusal(line);
+        assert!(message.contains(problem), "{line}: {message}");
+    }
+    let after: Vec<_> = folder.names().iter().map(|name| fs::read(folder.path(name)).unwrap()).collect();
+    assert_eq!(after, before);
+}
+
 /// The log comes through a pipe that stays open, so that the program is in the middle of writing when it is ended.
 #[cfg(unix)]
 #[test]

@@ -22,7 +22,7 @@ const OPENING: u64 = 1 << 12;
 const INTERRUPTED: i32 = 130;
 
 /// Overwriting of files.
-#[derive(Args, Clone, Copy)]
+#[derive(Args, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Force {
     /// Also overwrite recordings and files that flqr did not write. Without it, only earlier results of flqr
     /// and empty files are overwritten. An input is never overwritten
@@ -164,6 +164,7 @@ impl Origin {
             || opening.starts_with(MODEL_LINE.as_bytes())
             || Document::is_opening_of_html(&opening)
             || mcap::is_opening(&opening)
+            || flqr_gui::is_opening_of_state(&opening)
             || record::is_written_log(&opening, ending);
         Ok(match opening.starts_with(recording::FIRST_LINE.as_bytes()) {
             true => Self::Recording,

@@ -1,6 +1,6 @@
 //! Window, opened without a command.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use flqr_core::device::{SerialAddress, Source};
@@ -11,6 +11,7 @@ use super::input;
 use super::interrupt::{Duty, Interrupt};
 use super::logs::Columns;
 use super::output::{Failure, complain};
+use super::output_file::{self, Force, OutputFile};
 
 #[derive(Args, Default, PartialEq)]
 pub(crate) struct Arguments {
@@ -40,6 +41,8 @@ pub(crate) struct Arguments {
     /// Write the state of the window to this file as JSON, for scripts
     #[arg(long, value_name = "FILE")]
     state_out: Option<PathBuf>,
+    #[command(flatten)]
+    force: Force,
 }
 
 #[derive(Clone, Copy, PartialEq, ValueEnum)]
@@ -55,6 +58,7 @@ enum TabName {
 
 pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
     let tour = arguments == Arguments::default();
+    check_state_out(&arguments)?;
     let model = match &arguments.model {
         Some(path) => input::load_model(path)?,
         None => presets::paper(),
@@ -97,4 +101,16 @@ pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
     };
     Interrupt::watch(Duty::Window)?;
     flqr_gui::run(options).map_err(Failure::from_error)
+}
+
+/// Checks that the state is not written over an input, nor over a file that flqr did not write.
+fn check_state_out(arguments: &Arguments) -> Result<(), Failure> {
+    let replayed = match &arguments.source {
+        Some(Source::Replay { file }) => Some(file),
+        _ => None,
+    };
+    let inputs = [arguments.model.as_ref(), arguments.log.as_ref(), arguments.session.as_ref(), replayed];
+    let inputs: Vec<&Path> = inputs.into_iter().flatten().map(PathBuf::as_path).collect();
+    let output = arguments.state_out.as_deref().map(|path| OutputFile::new(path, "window state"));
+    output_file::check(&inputs, output.as_slice(), arguments.force)
 }

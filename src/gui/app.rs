@@ -37,7 +37,7 @@ use crate::refine::{RefineCommand, RefineTab};
 use crate::robot::{Link, RobotTab, sentence};
 use crate::runs::{Ledger, RunsTab};
 use crate::session::Session;
-use crate::state_out::StateOut;
+use crate::state_out::{ABOUT, StateOut};
 use crate::tab::Tab;
 use crate::tour::Tour;
 use crate::tune::TuneTab;
@@ -127,7 +127,7 @@ impl App {
         };
         let session = Session::new(options.model, ControllerKind::Flqr);
         let column_map = ColumnMapForm::new(&options.column_map);
-        let state_out = options.state_out.map(StateOut::start).transpose()?;
+        let state_out = options.state_out.map(|path| StateOut::start(path, Arc::clone(&waker))).transpose()?;
         let layout = Layout::new(options.tab);
         let experiments = ExperimentsTab::default();
         let base = Base { saved: session.clone(), path: options.model_path.clone() };
@@ -536,7 +536,10 @@ impl App {
     }
 
     fn write_state(&mut self, ctx: &Context) {
-        let Some(out) = &self.state_out else { return };
+        let Some(out) = &mut self.state_out else { return };
+        if let Some(problem) = out.problem() {
+            self.messages.add(Severity::Error, problem);
+        }
         if let Some(wait) = out.wait() {
             ctx.request_repaint_after(wait);
             return;
@@ -560,6 +563,7 @@ impl App {
         let poles = design.map(|d| d.poles.map(|pole| [pole.re, pole.im]));
         let friction = [0, 1].map(|motor| self.session.friction(motor).map(|curve| *curve.parameters()));
         serde_json::json!({
+            "about": ABOUT,
             "model": self.session.name,
             "unsaved_changes": self.session != self.saved,
             "tab": self.tab.key(),

@@ -54,5 +54,6 @@ mod write_file;
 pub use app::App;
 pub use document::default_folder as default_state_folder;
 pub use memory::keep_freed_memory;
+pub use state_out::is_opening_of_state;
 pub use tab::Tab;
 pub use window::{WindowError, WindowOptions, run};

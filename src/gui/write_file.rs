@@ -104,7 +104,7 @@ pub(crate) fn write_files(files: Files, replace: bool, watch: Watch<'_>) -> Resu
 }
 
 /// Reason why a file was not written, and the remedy.
-fn not_saved(path: &Path, error: &io::Error) -> String {
+pub(crate) fn not_saved(path: &Path, error: &io::Error) -> String {
     format!(
         "{} could not be saved: {error}; check the folder, its permissions and the free disk space.",
         path.display()
