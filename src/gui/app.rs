@@ -5,8 +5,10 @@ mod persistence;
 mod questions;
 mod shell;
 
+use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -111,6 +113,8 @@ pub struct App {
     frame_interval: Duration,
     frame_cpu_s: Option<f32>,
     frames: Frames,
+    /// Problem at the end of the window, for the exit code of the program.
+    pub(crate) end_problem: Rc<RefCell<Option<String>>>,
 }
 
 impl App {
@@ -127,7 +131,8 @@ impl App {
         };
         let session = Session::new(options.model, ControllerKind::Flqr);
         let column_map = ColumnMapForm::new(&options.column_map);
-        let state_out = options.state_out.map(|path| StateOut::start(path, Arc::clone(&waker))).transpose()?;
+        let state_out =
+            options.state_out.map(|path| StateOut::start(path, Arc::clone(&waker))).transpose()?;
         let layout = Layout::new(options.tab);
         let experiments = ExperimentsTab::default();
         let base = Base { saved: session.clone(), path: options.model_path.clone() };
@@ -191,6 +196,7 @@ impl App {
             frame_interval: Duration::from_millis(33),
             frame_cpu_s: None,
             frames: Frames::default(),
+            end_problem: Rc::default(),
         };
         app.reset_live();
         app.say_loaded();
@@ -220,7 +226,7 @@ impl App {
         Ok(app)
     }
 
-    /// Applies what views requested, and takes in what threads have brought. Draws nothing.
+    /// Applies the commands of views and takes the results of threads. Draws nothing.
     pub fn logic(&mut self, ctx: &Context) {
         self.release_status(ctx);
         self.drain_live();
@@ -334,7 +340,7 @@ impl App {
 
     fn drain_link(&mut self) {
         let before = self.link.stage();
-        let (updates, message) = self.link.drain();
+        let (updates, messages) = self.link.drain();
         for update in &updates {
             self.robot.note(update);
         }
@@ -346,13 +352,18 @@ impl App {
         }
         self.watch_recording();
         self.robot.drain();
-        match message {
-            None => {}
-            Some(Ok(message)) => self.say(message),
-            Some(Err(problem)) => {
-                self.fail(problem);
-                // What is there may have changed.
-                self.robot.look(&self.link, &self.waker);
+        for message in messages {
+            match message {
+                Ok(message) => {
+                    self.say(message);
+                    // The design may have been edited while the session was opened.
+                    self.send_controller();
+                }
+                Err(problem) => {
+                    self.fail(problem);
+                    // What is there may have changed.
+                    self.robot.look(&self.link, &self.waker);
+                }
             }
         }
         self.say_stage(before);
@@ -492,6 +503,21 @@ impl App {
         }
     }
 
+    /// Returns whether `action` must wait because the motors may have torque, after showing that.
+    fn is_refused_while_hot(&mut self, action: &str) -> bool {
+        let is_hot = self.link.is_hot();
+        if is_hot {
+            let remedy = match self.link.awaits_motors_off() {
+                true => {
+                    "The motors have not confirmed that they are off. Switch off their supply and disconnect"
+                }
+                false => "The robot may move. Stop it",
+            };
+            self.fail(format!("{remedy} before you {action}."));
+        }
+        is_hot
+    }
+
     /// The running robot gets new gains; the first gains of a model start it.
     fn follow_design(&mut self) {
         let started = self.designer.in_force.is_some();
@@ -614,7 +640,8 @@ fn read_recent(file: Option<PathBuf>, waker: &Waker) -> std::io::Result<Option<J
 
 impl eframe::App for App {
     fn on_exit(&mut self, _: Option<&eframe::glow::Context>) {
-        self.end();
+        let problem = self.end();
+        self.end_problem.replace(problem);
     }
 
     fn logic(&mut self, ctx: &Context, frame: &mut eframe::Frame) {

@@ -119,6 +119,11 @@ impl<P: Send + 'static, R: Send + 'static> Job<P, R> {
         (self.reports.take(), outcome)
     }
 
+    /// Waits for the result; `None` if the work panicked.
+    pub(crate) fn wait(&self) -> Option<R> {
+        self.result.recv().ok()
+    }
+
     /// Asks the work to stop; its result says that it was stopped.
     pub(crate) fn cancel(&self) {
         self.cancel.store(true, Ordering::Relaxed);
@@ -185,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cancelled_job_stops_by_itself() {
+    fn a_cancelled_job_stops() {
         let mut job = Job::start("test", &no_waker(), |reporter: &Reporter<()>| {
             while reporter.progress(()).is_continue() {
                 std::thread::yield_now();
@@ -198,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn a_job_that_breaks_is_told_apart_from_one_that_runs() {
+    fn a_job_that_panics_differs_from_one_that_runs() {
         let mut job = Job::<(), ()>::start("test", &no_waker(), |_| panic!("expected in this test")).unwrap();
         assert!(matches!(wait(&mut job).1, Outcome::Broken));
     }

@@ -1,6 +1,8 @@
 //! Opening the window, and one clear sentence when that cannot be done.
 
+use std::cell::RefCell;
 use std::path::PathBuf;
+use std::rc::Rc;
 use std::sync::Arc;
 
 use flqr_core::device::{SerialAddress, Source};
@@ -83,11 +85,17 @@ pub enum WindowError {
         /// Message of the system.
         reason: String,
     },
+    /// The last connection to a robot ended with a problem, such as motors that have not confirmed that they are off.
+    Robot {
+        /// The problem and its remedy.
+        problem: String,
+    },
 }
 
 impl std::fmt::Display for WindowError {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
+            Self::Robot { problem } => f.write_str(problem),
             Self::NoDisplay { reason } => write!(
                 f,
                 "the window needs a display with OpenGL, which is not available ({reason}): without it, use `flqr gains`, `flqr fit`, `flqr simulate`, `flqr riccati` or `flqr export`"
@@ -110,7 +118,8 @@ const ICON: &[u8] = include_bytes!("../../assets/icon.png");
 /// Opens the window and returns when it is closed.
 ///
 /// # Errors
-/// No display, no OpenGL, or a missing library of the window system.
+/// No display, no OpenGL, a missing library of the window system, or a problem at the end of the last connection to a
+/// robot.
 pub fn run(options: WindowOptions) -> Result<(), WindowError> {
     check_display()?;
     keep_freed_memory();
@@ -118,9 +127,11 @@ pub fn run(options: WindowOptions) -> Result<(), WindowError> {
     let quiet = std::panic::take_hook();
     let opening = std::sync::Arc::new(std::sync::atomic::AtomicBool::new(true));
     install_hook(quiet, &opening);
-    let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| open(options, &opening)));
+    let end_problem = Rc::default();
+    let show = || open(options, &opening, &end_problem);
+    let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(show));
     match result {
-        Ok(Ok(())) => Ok(()),
+        Ok(Ok(())) => end_problem.take().map_or(Ok(()), |problem| Err(WindowError::Robot { problem })),
         Ok(Err(error)) => Err(WindowError::NoDisplay { reason: last_cause(&error.to_string()) }),
         Err(payload) if opening.load(std::sync::atomic::Ordering::Relaxed) => {
             Err(WindowError::MissingLibrary { reason: one_line(panic_text(&*payload)) })
@@ -141,7 +152,11 @@ fn install_hook(usual: Hook, opening: &std::sync::Arc<std::sync::atomic::AtomicB
     }));
 }
 
-fn open(options: WindowOptions, opening: &std::sync::atomic::AtomicBool) -> eframe::Result {
+fn open(
+    options: WindowOptions,
+    opening: &std::sync::atomic::AtomicBool,
+    end_problem: &Rc<RefCell<Option<String>>>,
+) -> eframe::Result {
     let mut viewport = egui::ViewportBuilder::default()
         .with_title("flqr")
         .with_app_id("flqr")
@@ -164,7 +179,9 @@ fn open(options: WindowOptions, opening: &std::sync::atomic::AtomicBool) -> efra
         native,
         Box::new(|creation| {
             opening.store(false, std::sync::atomic::Ordering::Relaxed);
-            Ok(Box::new(App::new(options, &creation.egui_ctx)?))
+            let mut app = App::new(options, &creation.egui_ctx)?;
+            app.end_problem = Rc::clone(end_problem);
+            Ok(Box::new(app))
         }),
     )
 }

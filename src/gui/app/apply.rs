@@ -167,7 +167,7 @@ impl App {
             Command::ShowDialog(purpose) => self.show_dialog(purpose),
             Command::LoadPreset(number) => self.ask_preset(number),
             Command::TakePreset(number) => self.load_preset(number),
-            // Who opens a log where a model is requested means the log.
+            // A log that is opened as a model is loaded as a log.
             Command::LoadModel(path) if path.extension().is_some_and(|ending| ending == "csv") => {
                 self.commands.send(Command::LoadLog(path));
                 self.commands.send(Command::SelectTab(Tab::Friction));
@@ -314,8 +314,8 @@ impl App {
         if source == self.source {
             return;
         }
-        if self.link.is_hot() {
-            return self.fail("The robot may move. Stop it before you change the source.");
+        if self.is_refused_while_hot("change the source") {
+            return;
         }
         self.link.close(&self.waker);
         self.link.forget();
@@ -430,8 +430,7 @@ impl App {
 
     /// Says whether the model was taken.
     pub(super) fn open_model(&mut self, model: Model, path: Option<PathBuf>) -> bool {
-        if self.link.is_hot() {
-            self.fail("The robot may move. Stop it before you load another model.");
+        if self.is_refused_while_hot("load another model") {
             return false;
         }
         // A robot is driven by the model that it was connected with, or not at all.

@@ -69,8 +69,8 @@ impl App {
         let Some(content) = self.undo.peek(redo) else {
             return self.say(if redo { "There is nothing to redo." } else { "There is nothing to undo." });
         };
-        if content.base != self.base && self.link.is_hot() {
-            return self.fail("The robot may move. Stop it before you change the model.");
+        if content.base != self.base && self.is_refused_while_hot("change the model") {
+            return;
         }
         let Some((name, content)) = self.undo.go(redo) else { return };
         self.experiments.set_settings(content.experiment);
@@ -206,8 +206,7 @@ impl App {
 
     /// Takes over a session as a whole; nothing is connected by that. Says whether it was taken.
     pub(super) fn take_document(&mut self, name: &str, document: &Document, ctx: &Context) -> bool {
-        if self.link.is_hot() {
-            self.fail("The robot may move. Stop it before you open another session.");
+        if self.is_refused_while_hot("open another session") {
             return false;
         }
         self.undo.call(format!("open {name}"));
@@ -374,7 +373,7 @@ impl App {
     }
 
     fn drain_session_job(&mut self, ctx: &Context) {
-        // What the window begins with must not come over what was requested.
+        // The session of the last window must not replace one that was opened meanwhile.
         if self.opening.is_some() {
             return;
         }
@@ -432,14 +431,15 @@ impl App {
         taken
     }
 
-    /// Asks before a driven robot is stopped, or changes of the model are lost, with the window.
+    /// Asks before the window is closed while motors may have torque, or while the model has unsaved changes.
     pub(super) fn answer_close(&mut self, ctx: &Context) {
-        if self.leaving && !self.link.is_driven() {
+        let may_have_torque = self.link.is_driven() || self.link.awaits_motors_off();
+        if self.leaving && !may_have_torque {
             ctx.send_viewport_cmd(ViewportCommand::Close);
             return;
         }
         let question = match () {
-            () if self.link.is_driven() => Question::LeaveDriven,
+            () if may_have_torque => Question::LeaveDriven,
             () if self.session != self.saved => Question::Leave,
             () => return,
         };
@@ -450,11 +450,14 @@ impl App {
         }
     }
 
-    /// The window is closed: its session is the last one.
-    pub fn end(&mut self) {
+    /// Keeps the session of the window as the last one, and ends the connection to a robot. Returns the problem
+    /// with which the last connection ended.
+    pub fn end(&mut self) -> Option<String> {
         let text = self.document(&self.ctx.clone()).to_json();
         if let Some(store) = &mut self.store {
             store.close(&text);
         }
+        let problems = self.link.end(&self.waker);
+        (!problems.is_empty()).then(|| problems.join("; "))
     }
 }

@@ -26,7 +26,7 @@ const LONGEST_TABLE: f32 = 340.0;
 pub(super) enum Question {
     /// The window is to be closed, and the model is not saved.
     Leave,
-    /// The window is to be closed while the robot is driven.
+    /// The window is to be closed while the robot is driven or its motors have not confirmed that they are off.
     LeaveDriven,
     /// Gains that change by much are to be applied to the robot.
     Gains { changes: Vec<GainChange> },
@@ -265,7 +265,7 @@ impl App {
     fn ask_ui(&self, question: &mut Question, ui: &mut Ui) -> Reply {
         match question {
             Question::Leave => self.leave_ui(ui),
-            Question::LeaveDriven => leave_driven_ui(ui),
+            Question::LeaveDriven => leave_driven_ui(self.link.awaits_motors_off(), ui),
             Question::Gains { changes } => gains_ui(changes, ui),
             Question::Preset { number, name, changes } => preset_ui(*number, name, changes, ui),
             Question::Restore { document, whole, .. } => restore_ui(document, *whole, ui),
@@ -394,10 +394,22 @@ fn with_letter(ui: &Ui, key: Key, name: &str) -> LayoutJob {
     job
 }
 
-fn leave_driven_ui(ui: &mut Ui) -> Reply {
+fn leave_driven_ui(awaits_motors_off: bool, ui: &mut Ui) -> Reply {
+    let stop = Answer::Send(Command::StopAndQuit);
+    if awaits_motors_off {
+        ui.heading("Close although the motors may have torque?");
+        ui.label("The motors have not confirmed that they are off: switch off their supply.");
+        let help = "Close the window and stop switching the motors off";
+        return answers_ui(
+            ui,
+            [
+                (Key::A, "Close anyway", help, stop),
+                (Key::C, "Cancel", "Continue to switch the motors off", Answer::Close),
+            ],
+        );
+    }
     ui.heading("Stop the robot and close?");
     ui.label("The robot is being driven. It will fall when stopped unless someone holds it.");
-    let stop = Answer::Send(Command::StopAndQuit);
     answers_ui(
         ui,
         [

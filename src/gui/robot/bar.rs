@@ -1,4 +1,4 @@
-//! The strip under the tabs while a robot is the source: stage, connection, rates, recording, and the way out.
+//! The strip under the tabs while a robot is the source: stage, connection, rates, recording, and STOP.
 
 use egui::{Align, Button, Color32, Frame, Label, Layout, Margin, Response, RichText, Ui, vec2};
 use flqr_core::control::drive::{Stage, StopReason};
@@ -17,7 +17,7 @@ const STOP_FILL: Color32 = Color32::from_rgb(196, 32, 28);
 
 pub(crate) const STOP_HEIGHT: f32 = 30.0;
 
-/// The strip; says whether STOP was pressed.
+/// Draws the strip; returns whether STOP was pressed.
 pub(crate) fn bar_ui(link: &Link, (source, tab): (Source, Tab), commands: &Commands, ui: &mut Ui) -> bool {
     ui.horizontal(|ui| {
         ui.set_height(STOP_HEIGHT);
@@ -40,16 +40,17 @@ pub(crate) fn bar_ui(link: &Link, (source, tab): (Source, Tab), commands: &Comma
     .inner
 }
 
-/// The button that takes torque and power off.
+/// Draws the button that sets the torque to zero and switches the motors off.
 pub(crate) fn stop_ui(ui: &mut Ui, size: egui::Vec2) -> Response {
     let text = RichText::new("STOP   Esc, Space").strong().color(Color32::WHITE);
     let button = Button::new(text).fill(STOP_FILL).min_size(size);
     ui.add(button).accessible_name("STOP").on_hover_text("No torque, motors off, immediately (Esc or Space)")
 }
 
-/// Name of a stage, for people.
-pub(super) fn stage_name(stage: Option<Stage>) -> &'static str {
-    match stage {
+/// Displayed name of the stage.
+pub(super) fn stage_name(link: &Link) -> &'static str {
+    match link.stage() {
+        _ if link.awaits_motors_off() => "Motors not confirmed off",
         None => "Disconnected",
         Some(Stage::Listening) => "Listening",
         Some(Stage::Checking) => "Checking",
@@ -60,8 +61,8 @@ pub(super) fn stage_name(stage: Option<Stage>) -> &'static str {
 
 fn chip_ui(link: &Link, ui: &mut Ui) {
     let colors = palette(ui.visuals());
-    let stage = link.stage();
-    let (fill, text) = match stage {
+    let (fill, text) = match link.stage() {
+        None if !link.end_problems().is_empty() => (colors.error, ui.visuals().extreme_bg_color),
         None => (ui.visuals().widgets.inactive.bg_fill, ui.visuals().text_color()),
         Some(Stage::Listening) => (colors.accent, ui.visuals().extreme_bg_color),
         Some(Stage::Checking) => (colors.warning, ui.visuals().extreme_bg_color),
@@ -69,13 +70,18 @@ fn chip_ui(link: &Link, ui: &mut Ui) {
         Some(Stage::Stopped(_)) => (colors.error, ui.visuals().extreme_bg_color),
     };
     Frame::new().fill(fill).corner_radius(10).inner_margin(Margin::symmetric(12, 4)).show(ui, |ui| {
-        ui.add(Label::new(RichText::new(stage_name(stage)).strong().color(text)).selectable(false));
+        ui.add(Label::new(RichText::new(stage_name(link)).strong().color(text)).selectable(false));
     });
 }
 
 fn text_ui(link: &Link, (source, tab): (Source, Tab), commands: &Commands, ui: &mut Ui) {
     let colors = palette(ui.visuals());
     let Some(options) = link.options() else {
+        if let Some(problem) = link.end_problems().first() {
+            let problem = RichText::new(sentence(problem)).strong().color(colors.error);
+            ui.add(Label::new(problem).truncate());
+            return;
+        }
         let away = tab != Tab::Robot;
         if away && ui.button("Go to connection").on_hover_text("The Robot tab (Ctrl+5)").clicked() {
             commands.send(Command::SelectTab(Tab::Robot));
@@ -85,7 +91,7 @@ fn text_ui(link: &Link, (source, tab): (Source, Tab), commands: &Commands, ui: &
     };
     ui.label(RichText::new(options.source.to_string()).monospace());
     if let Some(Stage::Stopped(reason)) = link.stage() {
-        ui.add(Label::new(RichText::new(stopped(&reason)).strong().color(colors.error)).truncate());
+        ui.add(Label::new(RichText::new(stopped(link, &reason)).strong().color(colors.error)).truncate());
         return;
     }
     let (text, good) = connection_text(link);
@@ -93,9 +99,14 @@ fn text_ui(link: &Link, (source, tab): (Source, Tab), commands: &Commands, ui: &
     ui.add(Label::new(if good { text } else { text.strong().color(colors.warning) }).truncate());
 }
 
-/// Describes the reason and the remedy in one sentence.
-pub(super) fn stopped(reason: &StopReason) -> String {
+/// Describes a stop: motors that may still have torque first, then the reason and the remedy.
+pub(super) fn stopped(link: &Link, reason: &StopReason) -> String {
     let text = sentence(&reason.to_string());
+    if link.awaits_motors_off() {
+        return format!(
+            "Waiting for the motors to confirm that they are off. If this remains, switch off their supply. {text}"
+        );
+    }
     remedy(reason).map_or_else(|| text.clone(), |remedy| format!("{text} {remedy}"))
 }
 
@@ -119,7 +130,7 @@ fn remedy(reason: &StopReason) -> Option<&'static str> {
     })
 }
 
-/// State of the connection, and whether it is normal.
+/// Describes the connection; the second value is true if it is normal.
 pub(super) fn connection_text(link: &Link) -> (String, bool) {
     let Some(status) = &link.status else {
         let text =
@@ -167,7 +178,7 @@ fn recording_ui(link: &Link, ui: &mut Ui) {
     ui.label(RichText::new(text).strong().color(color)).on_hover_text(help);
 }
 
-/// Commands of a session during replay.
+/// Draws the controls of a replay.
 pub(super) fn replay_ui(context: &ViewContext<'_>, speed: &mut f64, ui: &mut Ui) {
     let paused = context.link.replay_is_paused;
     ui.horizontal(|ui| {

@@ -1,4 +1,4 @@
-//! Arming in two steps, what is checked before, and the controller active.
+//! Arming in two steps, the checks before it, and the active controller.
 
 use egui::{Button, RichText, Ui, vec2};
 use flqr_core::control::ControllerKind;
@@ -13,10 +13,10 @@ use crate::context::ViewContext;
 use crate::theme::palette;
 use crate::widgets::{choice_ui, hint_ui, section_ui, warning_ui};
 
-/// The section; says whether STOP was pressed.
+/// Draws the section; returns whether STOP was pressed.
 pub(super) fn drive_ui(context: &ViewContext<'_>, ui: &mut Ui) -> bool {
     section_ui(ui, "Drive", |ui| {
-        ui.label(RichText::new(stage_name(context.link.stage())).strong());
+        ui.label(RichText::new(stage_name(context.link)).strong());
     });
     if !context.link.may_drive() {
         ui.label(RichText::new("Listening only: nothing is sent.").strong());
@@ -68,7 +68,7 @@ fn task_ui(context: &ViewContext<'_>, ui: &mut Ui) {
     pending_ui(context, ui);
 }
 
-/// Limits that the model has switched off: whoever arms the robot must know them.
+/// Lists the limits that the model has disabled, next to the buttons that arm the robot.
 fn unsafe_limits_ui(context: &ViewContext<'_>, ui: &mut Ui) {
     let Some(options) = context.link.options() else { return };
     for limit in options.robot.safety.unsafe_limits() {

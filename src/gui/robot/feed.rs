@@ -2,25 +2,29 @@
 
 use std::fmt;
 
-use flqr_core::device::{self, Interfaces, Session, SessionOptions, SessionOrder, Update};
+use flqr_core::device::{self, Ending, Interfaces, Session, SessionOptions, SessionOrder, Update};
 
 use crate::job::Waker;
 
-/// A robot that is watched or driven. Dropping it stops everything: no torque, motors off.
+/// A robot that is monitored or driven. Dropping it sets the torque to zero and switches the motors off.
 pub trait RobotFeed: Send {
-    /// Hands an order over. Never waits.
+    /// Passes an order on. Never waits.
     fn send(&mut self, order: SessionOrder);
 
-    /// All updates since the last call. Never waits.
+    /// Returns all updates since the last call. Never waits.
     fn poll(&mut self) -> Vec<Update>;
 
-    /// Returns whether it has ended although nobody requested it.
+    /// Returns whether it has ended unexpectedly.
     fn has_died(&self) -> bool;
+
+    /// Switches the motors off, ends the session and returns its outcome; `None` after an internal error. Waits
+    /// until the motors confirm that they are off, and until the recording is complete.
+    fn close(self: Box<Self>) -> Option<Ending>;
 }
 
 /// Opens robots and lists possible connections.
 pub trait Devices: fmt::Debug + Send + Sync {
-    /// Opens a session, which calls `wake` when it has something to tell. May wait.
+    /// Opens a session, which calls `wake` for each update. May wait.
     ///
     /// # Errors
     /// One sentence: what, where, the remedy.
@@ -58,5 +62,9 @@ impl RobotFeed for Session {
 
     fn has_died(&self) -> bool {
         Self::has_died(self)
+    }
+
+    fn close(self: Box<Self>) -> Option<Ending> {
+        Self::close(*self)
     }
 }

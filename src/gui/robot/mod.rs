@@ -42,7 +42,7 @@ pub(crate) use transfer::{change_rows_ui, pending_ui};
 /// Height of the tables below which the page scrolls.
 const LEAST_TABLE_HEIGHT: f32 = 230.0;
 
-/// State of the page that is no part of the session with the robot.
+/// State of the page apart from the session with the robot.
 #[derive(Default)]
 pub(crate) struct RobotTab {
     pub(crate) form: ConnectionForm,
@@ -60,7 +60,7 @@ impl RobotTab {
         self.looking = Job::start("list-interfaces", waker, move |_| devices.interfaces()).ok();
     }
 
-    /// Takes in what was found.
+    /// Takes the result of the search.
     pub(crate) fn drain(&mut self) {
         let Some(job) = &mut self.looking else { return };
         match job.poll().1 {
@@ -73,25 +73,25 @@ impl RobotTab {
         self.looking = None;
     }
 
-    /// Takes in what the robot has told.
+    /// Takes the frames and events of an update.
     pub(crate) fn note(&mut self, update: &Update) {
         self.frames.extend(&update.frames);
         self.events.extend(&update.events);
     }
 
-    /// Forgets what the last session has brought.
+    /// Removes the frames and events of the last session.
     pub(crate) fn forget(&mut self) {
         self.frames.begin(LinkSettings::default());
         self.events.clear();
     }
 
-    /// Another source is chosen: listening only, until somebody says otherwise of that one.
+    /// Prepares the page for another source, which is listen-only until the operator chooses otherwise.
     pub(crate) fn leave_source(&mut self) {
         self.forget();
         self.form.may_drive = false;
     }
 
-    /// Another session begins.
+    /// Prepares the page for a new session.
     pub(crate) fn begin(&mut self, options: &SessionOptions) {
         self.forget();
         self.frames.begin(options.robot.link);
@@ -102,7 +102,7 @@ impl RobotTab {
         }
     }
 
-    /// Goes on where the last connection was, unless something has been typed.
+    /// Fills the form with the last connection, unless something has been typed.
     pub(crate) fn suggest(&mut self, recent: &Recent) {
         if self.form != ConnectionForm::default() {
             return;
@@ -135,13 +135,13 @@ impl RobotTab {
         }
     }
 
-    /// Name that a dialog offers.
+    /// Name that the file dialog suggests.
     pub(crate) fn suggested_name(&self) -> String {
         let name = Path::new(&self.record.path).file_name();
         name.map_or_else(|| "robot.csv".to_owned(), |name| name.to_string_lossy().into_owned())
     }
 
-    /// The page; says whether STOP was pressed.
+    /// Draws the page; returns whether STOP was pressed.
     pub(crate) fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) -> bool {
         let panes = [
             Pane::left(Part::Connection, "Connection", 280.0, 250.0..=420.0),
@@ -210,7 +210,7 @@ impl RobotTab {
         });
     }
 
-    /// Raw frames at the left, events at the right.
+    /// Draws raw frames at the left and events at the right.
     fn tables_ui(&mut self, height: f32, ui: &mut Ui) {
         let spacing = ui.spacing().item_spacing.x + 6.0;
         let width = ui.available_width().max(1.0);
@@ -237,13 +237,20 @@ enum Part {
     Robot,
 }
 
-/// Reason for a stop or for missing data in large letters, with the remedy.
+/// Shows the reason for a stop or for missing data in large letters, with the remedy.
 fn banner_ui(context: &ViewContext<'_>, ui: &mut Ui) {
     let colors = palette(ui.visuals());
     let connection = context.link.status.as_ref().map(|status| &status.connection);
-    let (title, text, color) = match (context.link.stage(), connection) {
-        (None, _) => ("Disconnected", "These are the last measurements.".to_owned(), colors.reference),
-        (Some(Stage::Stopped(reason)), _) => ("Stopped", bar::stopped(&reason), colors.error),
+    let link = context.link;
+    let title = bar::stage_name(link);
+    let (title, text, color) = match (link.stage(), connection) {
+        (None, _) if !link.end_problems().is_empty() => {
+            let problems: Vec<_> =
+                link.end_problems().iter().map(|problem| link::sentence(problem)).collect();
+            (title, problems.join(" "), colors.error)
+        }
+        (None, _) => (title, "These are the last measurements.".to_owned(), colors.reference),
+        (Some(Stage::Stopped(reason)), _) => (title, bar::stopped(link, &reason), colors.error),
         (_, Some(Connection::Silent { hint })) => ("Silent", link::sentence(hint), colors.warning),
         (_, Some(Connection::Lost { reason })) => {
             ("Lost", format!("{} Reconnecting automatically.", link::sentence(reason)), colors.warning)
@@ -259,7 +266,7 @@ fn banner_ui(context: &ViewContext<'_>, ui: &mut Ui) {
         ui.horizontal_top(|ui| {
             ui.label(RichText::new(title).size(18.0).strong().color(color));
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Min), |ui| {
-                if matches!(context.link.stage(), Some(Stage::Stopped(_))) {
+                if matches!(link.stage(), Some(Stage::Stopped(_))) && !link.awaits_motors_off() {
                     use flqr_core::control::drive::DriveOrder;
                     use flqr_core::device::SessionOrder;
                     let release = Button::new("Release").min_size(vec2(90.0, 26.0));

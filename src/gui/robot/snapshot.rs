@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use super::{Link, RobotTab};
 
 impl RobotTab {
-    /// The page for scripts.
+    /// Returns the state of the page.
     pub(crate) fn snapshot(&self, link: &Link) -> Value {
         let status = link.status.as_ref();
         let last_event = self.events.last().map(|event| &event.text);
@@ -21,6 +21,8 @@ impl RobotTab {
                 Some(Stage::Stopped(reason)) => Some(reason.name()),
                 _ => None,
             },
+            "motors_off": link.drive().map(|drive| drive.motors_off),
+            "end_problems": link.end_problems(),
             "may_arm": link.may_arm(),
             "gains": link.transfer.snapshot(),
             "checks": status.and_then(|status| status.drive.as_ref()).map(checks),

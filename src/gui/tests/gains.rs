@@ -6,7 +6,7 @@ mod common;
 
 use std::sync::Arc;
 
-use common::script::{GOOD, Script, arm, at_stage, drive_window, tell};
+use common::script::{GOOD, Script, arm, at_stage, connecting_window, drive_window, tell};
 use common::{SIZE, TempFile, Window, click, closes, enter, open, options, state, until};
 use egui::{Event, Key, Modifiers};
 use egui_kittest::kittest::Queryable;
@@ -68,7 +68,7 @@ fn a_driven_robot_gets_new_gains_on_request() {
 }
 
 #[test]
-fn a_large_change_is_asked_about_and_an_unstable_one_refused() {
+fn a_large_change_needs_a_confirmation_and_an_unstable_one_is_refused() {
     let script = Script::default();
     let mut window = driven(&script);
     enter(&mut window, "displacement weight", "600");
@@ -131,6 +131,26 @@ fn a_robot_that_is_not_driven_has_the_gains_of_the_design_unless_they_are_refuse
     tell(&mut window, &script, at_stage(2.0, Stage::Stopped(StopReason::Requested), &[]));
     assert_eq!(controllers(&script).len(), 1);
     assert_eq!(gains(&window)["pending"], Value::Null);
+}
+
+#[test]
+fn a_design_that_is_edited_while_the_window_connects_reaches_the_robot() {
+    let script = Script::default();
+    script.with(|shared| shared.holds_opening = true);
+    let mut window = connecting_window(&script);
+    until(&mut window, "opening", |_| script.with(|shared| shared.opened.len() == 1));
+    click(&mut window, "Tune");
+    let start = gains(&window)["gain"][2].clone();
+    enter(&mut window, "pitch weight", "150");
+    assert_eq!(gains(&window)["gain"][2], start, "nothing has been sent");
+    script.with(|shared| shared.holds_opening = false);
+    until(&mut window, "connecting", |s| s["robot_tab"]["session"] == "open");
+    let sent = controllers(&script);
+    let [controller] = &sent[..] else { panic!("{sent:?}") };
+    let now = state(&window);
+    assert_eq!(now["gain"][0][2].as_f64(), Some(controller.gain[(0, 2)]));
+    assert_eq!(now["robot_tab"]["gains"]["gain"][2], now["gain"][0][2]);
+    assert_ne!(now["gain"][0][2], start);
 }
 
 /// Whatever is typed, manually or live, only gains that the gate lets through are sent.

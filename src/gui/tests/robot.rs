@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use common::script::*;
 use common::{
-    SIZE, TempFile, Window, click, command, enter, next, open, options, random_input, state, until,
+    SIZE, TempFile, Window, click, closes, command, enter, next, open, options, random_input, state, until,
 };
 use egui::accesskit::Role;
 use egui::{Event as Input, Key, Modifiers, Vec2, vec2};
@@ -53,7 +53,7 @@ fn a_robot_is_listened_to_from_the_command_line_and_nothing_is_sent() {
 }
 
 #[test]
-fn what_cannot_be_opened_is_said_with_its_mend() {
+fn a_refused_connection_is_reported_with_its_remedy() {
     let script = Script::default();
     let problem = "can7 does not exist: make it with `ip link add can7 type vcan`";
     script.with(|shared| shared.refuse = Some(problem.to_owned()));
@@ -119,7 +119,7 @@ fn interfaces_are_listed_and_chosen_and_without_any_the_commands_are_shown() {
 }
 
 #[test]
-fn a_form_that_misses_something_says_so_and_does_not_connect() {
+fn an_incomplete_form_is_reported_and_does_not_connect() {
     let script = Script::default();
     let window_options = WindowOptions { devices: Arc::new(script.clone()), ..options(Tab::Robot) };
     let mut window = open(window_options, SIZE);
@@ -266,7 +266,7 @@ fn space_does_not_press_the_focused_button_while_it_stops() {
 }
 
 #[test]
-fn keys_stop_from_the_moment_that_arming_was_asked_for() {
+fn keys_stop_as_soon_as_arming_is_commanded() {
     let script = Script::default();
     let mut window = drive_window(&script);
     script.drive_orders();
@@ -280,7 +280,7 @@ fn keys_stop_from_the_moment_that_arming_was_asked_for() {
 }
 
 #[test]
-fn a_closed_session_is_stopped_and_let_go() {
+fn closing_a_session_stops_the_robot() {
     let script = Script::default();
     let mut window = drive_window(&script);
     arm(&mut window, &script);
@@ -295,7 +295,7 @@ fn a_closed_session_is_stopped_and_let_go() {
 }
 
 #[test]
-fn a_session_that_ends_by_itself_is_said() {
+fn a_session_that_ends_unexpectedly_is_reported() {
     let script = Script::default();
     let mut window = drive_window(&script);
     arm(&mut window, &script);
@@ -303,6 +303,104 @@ fn a_session_that_ends_by_itself_is_said() {
     let ended = until(&mut window, "the end", |s| s["robot_tab"]["session"] == "closed");
     assert!(ended["message"].as_str().unwrap().contains("Switch the robot off manually"), "{ended:#}");
     assert_eq!(ended["robot_tab"]["stage"], "disconnected");
+    assert!(end(&mut window).unwrap().contains("internal error"));
+}
+
+/// Ends the window as its library does; returns the problem for the exit code.
+fn end(window: &mut Window) -> Option<String> {
+    window.state_mut().as_mut().unwrap().end()
+}
+
+#[test]
+fn a_stopped_robot_is_not_left_before_its_motors_have_confirmed_that_they_are_off() {
+    let script = Script::default();
+    let mut window = drive_window(&script);
+    arm(&mut window, &script);
+    let reason = StopReason::Tilt { pitch_rad: 0.6 };
+    tell(&mut window, &script, not_off(2.0, reason));
+    assert_eq!(state(&window)["robot_tab"]["motors_off"], false);
+    assert_eq!(window.get_all_by_label("Motors not confirmed off").count(), 3, "strip, drive and page");
+    assert!(window.get_all_by_label_contains("switch off their supply").count() >= 2);
+    assert!(window.query_by_label("Release the stop").is_none(), "it would be refused");
+    click(&mut window, "simulated");
+    let refused = state(&window);
+    assert!(refused["message"].as_str().unwrap().contains("have not confirmed that they are off"));
+    assert_eq!(refused["source"], "emulated");
+    assert!(!closes(&mut window));
+    assert_eq!(state(&window)["question"], "leave-driven");
+    click(&mut window, "Cancel");
+    window.key_press(Key::Space);
+    window.run_steps(2);
+    assert_eq!(script.drive_orders(), [DriveOrder::Stop]);
+    tell(&mut window, &script, at_stage(2.1, Stage::Stopped(reason), &[]));
+    assert!(window.query_by_label("Motors not confirmed off").is_none());
+    window.get_by_label("Release the stop");
+    assert!(closes(&mut window));
+    assert_eq!(end(&mut window), None);
+}
+
+#[test]
+fn motors_that_are_not_confirmed_off_at_the_end_of_a_session_are_reported_and_fail_the_program() {
+    for disconnects in [true, false] {
+        let script = Script::default();
+        script.with(|shared| shared.motors_stay_on = true);
+        let mut window = drive_window(&script);
+        arm(&mut window, &script);
+        if disconnects {
+            click(&mut window, "Disconnect");
+            let ended = until(&mut window, "closing", |s| s["robot_tab"]["session"] == "closed");
+            window.run_steps(2);
+            assert!(ended["message"].as_str().unwrap().contains("switch off their supply"), "{ended:#}");
+            assert!(
+                window.get_all_by_label_contains("switch off their supply").count() >= 2,
+                "strip and page"
+            );
+        }
+        let problem = end(&mut window).unwrap();
+        assert_eq!(problem, "the motors have not confirmed that they are off: switch off their supply");
+        assert!(script.with(|shared| shared.closed));
+    }
+    // The next session ends well.
+    let script = Script::default();
+    script.with(|shared| shared.motors_stay_on = true);
+    let mut window = drive_window(&script);
+    click(&mut window, "Disconnect");
+    until(&mut window, "closing", |s| s["robot_tab"]["session"] == "closed");
+    script.with(|shared| shared.motors_stay_on = false);
+    window.run_steps(2);
+    click(&mut window, "Connect");
+    until(&mut window, "connecting", |s| s["robot_tab"]["session"] == "open");
+    assert_eq!(end(&mut window), None);
+}
+
+#[test]
+fn a_recording_that_fails_at_the_end_of_its_session_is_reported() {
+    let script = Script::default();
+    let mut window = drive_window(&script);
+    let problem = Some("7 rows were not recorded: use a faster disk".to_owned());
+    script.with(|shared| shared.recording = Some(RecordingStatus { problem, ..recording() }));
+    click(&mut window, "Disconnect");
+    let ended = until(&mut window, "closing", |s| s["robot_tab"]["session"] == "closed");
+    assert_eq!(ended["message"], "7 rows were not recorded: use a faster disk.");
+}
+
+#[test]
+fn a_cancelled_connection_holds_its_port_until_it_is_closed_and_the_next_one_waits_for_it() {
+    let script = Script::default();
+    script.with(|shared| shared.holds_opening = true);
+    let mut window = connecting_window(&script);
+    until(&mut window, "opening", |_| script.with(|shared| shared.opened.len() == 1));
+    click(&mut window, "Cancel");
+    assert_eq!(state(&window)["robot_tab"]["session"], "closing");
+    window.get_by_label("Disconnecting…");
+    // The shortcut goes past the button.
+    window.key_press_modifiers(Modifiers::COMMAND, Key::Enter);
+    window.run_steps(3);
+    assert_eq!(state(&window)["robot_tab"]["session"], "opening");
+    assert_eq!(script.with(|shared| shared.opened.len()), 1, "the port is still in use");
+    script.with(|shared| shared.holds_opening = false);
+    until(&mut window, "connecting", |s| s["robot_tab"]["session"] == "open");
+    assert!(script.with(|shared| shared.closed && shared.opened.len() == 2));
 }
 
 #[test]
@@ -409,6 +507,17 @@ fn frames_are_filtered_by_id_bytes_and_direction_and_held() {
     assert_eq!(shown(&window), before);
 }
 
+fn recording() -> RecordingStatus {
+    RecordingStatus {
+        file: "/data/run7.csv".into(),
+        rows: 1900,
+        rows_lost: 0,
+        frames: 7600,
+        bytes: 1_250_000,
+        problem: None,
+    }
+}
+
 #[test]
 fn a_recording_is_started_shown_and_ended() {
     let script = Script::default();
@@ -421,15 +530,7 @@ fn a_recording_is_started_shown_and_ended() {
     let orders = script.with(|shared| std::mem::take(&mut shared.orders));
     assert!(orders.contains(&SessionOrder::Record(Some("/data/run7.csv".into()))), "{orders:?}");
     let mut told = update(2.0);
-    let recording = RecordingStatus {
-        file: "/data/run7.csv".into(),
-        rows: 1900,
-        rows_lost: 0,
-        frames: 7600,
-        bytes: 1_250_000,
-        problem: None,
-    };
-    told.status.recording = Some(recording.clone());
+    told.status.recording = Some(recording());
     tell(&mut window, &script, told.clone());
     for text in ["REC", "1900", "7600", "1.25 MB"] {
         window.get_by_label(text);
@@ -438,7 +539,7 @@ fn a_recording_is_started_shown_and_ended() {
     let orders = script.with(|shared| std::mem::take(&mut shared.orders));
     assert!(orders.contains(&SessionOrder::Record(None)), "{orders:?}");
     let problem = Some("the disk is full: make room".to_owned());
-    told.status.recording = Some(RecordingStatus { problem, ..recording });
+    told.status.recording = Some(RecordingStatus { problem, ..recording() });
     tell(&mut window, &script, told);
     window.get_by_label("Recording stopped: the disk is full: make room");
     window.get_by_label("Record");

@@ -3,10 +3,10 @@
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use flqr_core::control::drive::{Check, CheckResult, DriveOrder, Stage};
+use flqr_core::control::drive::{Check, CheckResult, DriveOrder, Stage, StopReason};
 use flqr_core::device::{
-    Advice, CanInterface, Connection, Counters, DriveStatus, ImuStatus, Interfaces, MotorStatus, SerialPort,
-    SessionOptions, SessionOrder, Status, Timing, Update,
+    Advice, CanInterface, Connection, Counters, DriveStatus, Ending, ImuStatus, Interfaces, MotorStatus,
+    RecordingStatus, SerialPort, SessionOptions, SessionOrder, Status, Timing, Update,
 };
 use flqr_core::link::{Direction, Frame, FrameId, MotorErrors, MotorHealth, StampedFrame};
 use flqr_core::record::Sample;
@@ -24,6 +24,12 @@ pub(crate) struct Shared {
     pub(crate) closed: bool,
     pub(crate) died: bool,
     pub(crate) refuse: Option<String>,
+    /// Opening waits until this is false.
+    pub(crate) holds_opening: bool,
+    /// At the end of a session, the motors have not confirmed that they are off.
+    pub(crate) motors_stay_on: bool,
+    /// The recording at the end of a session.
+    pub(crate) recording: Option<RecordingStatus>,
     pub(crate) can: Vec<CanInterface>,
     pub(crate) serial: Vec<SerialPort>,
     pub(crate) advice: Vec<Advice>,
@@ -67,6 +73,13 @@ impl RobotFeed for ScriptFeed {
     fn has_died(&self) -> bool {
         self.0.with(|shared| shared.died)
     }
+
+    fn close(self: Box<Self>) -> Option<Ending> {
+        self.0.with(|shared| {
+            let motors_off = !shared.motors_stay_on;
+            (!shared.died).then(|| Ending { motors_off, recording: shared.recording.clone() })
+        })
+    }
 }
 
 impl Drop for ScriptFeed {
@@ -82,6 +95,9 @@ impl Devices for Script {
         _wake: Arc<dyn Fn() + Send + Sync>,
     ) -> Result<Box<dyn RobotFeed>, String> {
         self.with(|shared| shared.opened.push(options));
+        while self.with(|shared| shared.holds_opening) {
+            std::thread::yield_now();
+        }
         match self.with(|shared| shared.refuse.clone()) {
             Some(problem) => Err(problem),
             None => Ok(Box::new(ScriptFeed(self.clone()))),
@@ -186,6 +202,7 @@ pub(crate) fn update(time_s: f64) -> Update {
     Update { samples: Vec::new(), frames: Vec::new(), events: Vec::new(), status: status(time_s) }
 }
 
+/// Motors of a robot that is stopped are off.
 pub(crate) fn at_stage(time_s: f64, stage: Stage, checks: &[(&'static str, CheckResult, &str)]) -> Update {
     let check = |(name, result, text): &(&'static str, CheckResult, &str)| Check {
         name,
@@ -193,8 +210,8 @@ pub(crate) fn at_stage(time_s: f64, stage: Stage, checks: &[(&'static str, Check
         text: (*text).to_owned(),
     };
     let mut update = update(time_s);
-    update.status.drive =
-        Some(DriveStatus { stage, motors_off: false, checks: checks.iter().map(check).collect() });
+    let motors_off = matches!(stage, Stage::Listening | Stage::Stopped(_));
+    update.status.drive = Some(DriveStatus { stage, motors_off, checks: checks.iter().map(check).collect() });
     update
 }
 
@@ -236,13 +253,26 @@ pub(crate) fn script_window(tab: Tab, script: &Script, source: &str) -> Window {
     window
 }
 
-/// Connected in a session that may drive.
-pub(crate) fn drive_window(script: &Script) -> Window {
+/// A robot that is stopped, but whose motors have not confirmed that they are off.
+pub(crate) fn not_off(time_s: f64, reason: StopReason) -> Update {
+    let mut update = at_stage(time_s, Stage::Stopped(reason), &[]);
+    update.status.drive.as_mut().unwrap().motors_off = false;
+    update
+}
+
+/// On its way to a session that may drive.
+pub(crate) fn connecting_window(script: &Script) -> Window {
     let window_options = WindowOptions { devices: Arc::new(script.clone()), ..options(Tab::Robot) };
     let mut window = open(window_options, SIZE);
     click(&mut window, "emulated");
     click(&mut window, "May drive");
     click(&mut window, "Connect");
+    window
+}
+
+/// Connected in a session that may drive.
+pub(crate) fn drive_window(script: &Script) -> Window {
+    let mut window = connecting_window(script);
     until(&mut window, "connecting", |s| s["robot_tab"]["session"] == "open");
     tell(&mut window, script, at_stage(0.1, Stage::Listening, &[]));
     window
