@@ -73,7 +73,7 @@ pub fn fit(
     line.flag("--seed", options.seed.to_string()).0
 }
 
-/// Commands of a robot connection: watch, or drive. Arming stays to be requested.
+/// Commands of a robot connection: monitor, or drive. Arming remains a separate step.
 pub fn robot(
     options: &SessionOptions,
     signals: &[&str],

@@ -58,7 +58,7 @@ pub(crate) struct Comparison {
     pub(crate) active: Slot,
 }
 
-/// The design active, the last problem, and the design to compare with.
+/// The active design, the last problem, and the design to compare with.
 #[derive(Default)]
 pub(crate) struct Designer {
     tried: Option<(RobotParameters, Weights, SampledLoop)>,
@@ -77,7 +77,7 @@ pub(crate) struct Designer {
 }
 
 impl Designer {
-    /// Solves anew when the input differs from the last one; says whether the gains active changed.
+    /// Solves anew when the input differs from the last one; returns whether the active gains changed.
     pub(crate) fn update(&mut self, session: &Session) -> bool {
         let Some(robot) = session.robot() else {
             *self = Self::default();
@@ -97,7 +97,7 @@ impl Designer {
         Comparison { weights: self.reference.map(|reference| reference.weights), active: self.active }
     }
 
-    /// Takes over how the two designs stood next to each other; the one active stays.
+    /// Takes over the comparison of the two designs; the active one stays.
     pub(crate) fn compare(&mut self, comparison: Comparison) {
         self.active = comparison.active;
         if let (Some(in_force), Some(weights)) = (self.in_force, comparison.weights) {
@@ -135,13 +135,13 @@ impl Designer {
         }
     }
 
-    /// The other design, where it differs from the one active.
+    /// The other design, if it differs from the active one.
     pub(crate) fn different(&self) -> Option<Designed> {
         let in_force = self.in_force?;
         self.reference.filter(|reference| reference.design != in_force.design)
     }
 
-    /// Makes the other design the same as the one active.
+    /// Copies the active design to the other one.
     pub(crate) fn keep(&mut self) {
         self.reference = self.in_force;
     }

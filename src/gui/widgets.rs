@@ -208,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn a_change_is_told_in_percent_or_as_a_factor() {
+    fn a_change_is_shown_in_percent_or_as_a_factor() {
         for (a, b, text) in
             [(2.0, 3.0, "+50.0 %"), (-2.0, -1.0, "−50.0 %"), (1.0, 40.0, "×40.0"), (0.0, 1.0, "–")]
         {

@@ -1,4 +1,4 @@
-//! The commands themselves.
+//! Commands.
 
 use std::borrow::Cow;
 
@@ -23,7 +23,7 @@ const fn ctrl_shift(key: Key) -> KeyboardShortcut {
     KeyboardShortcut::new(Modifiers::COMMAND.plus(Modifiers::SHIFT), key)
 }
 
-/// Keys that take the torque off a robot that may move; they go before everything else, also in a field.
+/// Keys that stop a robot; they take precedence over everything else, even in a text field.
 pub(crate) const STOP_KEYS: [Key; 2] = [Key::Escape, Key::Space];
 
 /// Pointer and key gestures for the list of keys.
@@ -61,7 +61,7 @@ fn entry(
     }
 }
 
-/// All, in the order of the menus.
+/// All commands, in the order of the menus.
 pub(super) fn all() -> Vec<Entry> {
     [file(), preset(), edit(), view(), run(), help()].into_iter().flatten().collect()
 }

@@ -5,7 +5,7 @@ use egui::{Button, Grid, RichText, ScrollArea, Ui};
 use super::{ALL, Entry, GESTURES, Menu, Situation};
 use crate::command::Commands;
 
-/// The menu button with all menus.
+/// Draws the menu button with all menus.
 pub(crate) fn menu_ui(situation: &Situation<'_>, commands: &Commands, ui: &mut Ui) {
     let menu = ui.menu_button("Menu", |ui| {
         for menu in Menu::ALL {
@@ -57,7 +57,7 @@ fn entry_ui(entry: &Entry, situation: &Situation<'_>, commands: &Commands, ui: &
     }
 }
 
-/// The list of keys.
+/// Draws the list of shortcuts.
 pub(crate) fn keys_ui(ui: &mut Ui) {
     let room = (ui.ctx().content_rect().height() - 90.0).max(120.0);
     ScrollArea::vertical().max_height(room).min_scrolled_height(room).show(ui, |ui| {

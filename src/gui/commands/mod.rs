@@ -1,4 +1,4 @@
-//! The one list of what the window can be determined: menus, keys, help and palette are made of it.
+//! List of all commands of the window, from which menus, shortcuts, help and palette are made.
 
 mod entries;
 mod menu;
@@ -78,14 +78,14 @@ pub(crate) type Sent = Result<Command, &'static str>;
 
 /// One command.
 pub(crate) struct Entry {
-    /// For scripts and tests; unique.
+    /// Unique name for scripts and tests.
     pub(crate) id: Cow<'static, str>,
     pub(crate) menu: Menu,
     pub(crate) name: Cow<'static, str>,
     pub(crate) help: Cow<'static, str>,
-    /// Other words under which the palette finds it.
+    /// Further words by which the palette finds it.
     also: &'static str,
-    /// The menu inside of its menu that it is in.
+    /// Submenu.
     group: Option<&'static str>,
     pub(crate) keys: Vec<KeyboardShortcut>,
     send: Box<dyn Fn(&Situation<'_>) -> Sent + Send + Sync>,
@@ -107,7 +107,7 @@ impl Entry {
         (self.send)(situation)
     }
 
-    /// Name for screen readers: with the reason where it cannot be given.
+    /// Name for screen readers, with the reason if the command is unavailable.
     fn accessible_name(&self, sent: &Sent) -> String {
         match sent {
             Ok(_) => self.name.to_string(),
@@ -115,7 +115,7 @@ impl Entry {
         }
     }
 
-    /// Its keys, for people.
+    /// Displayed shortcut.
     pub(crate) fn keys_text(&self, ctx: &Context) -> String {
         let keys: Vec<_> = self.keys.iter().map(|keys| ctx.format_shortcut(keys)).collect();
         keys.join(", ")
@@ -125,8 +125,8 @@ impl Entry {
 /// All commands, in the order of the menus.
 pub(crate) static ALL: LazyLock<Vec<Entry>> = LazyLock::new(entries::all);
 
-/// The command of whose keys one was pressed; its keys are taken away from everybody else. Keys with more
-/// modifiers go first, since those with fewer would answer to them too.
+/// Returns the command whose shortcut was pressed, and consumes the shortcut. Shortcuts with more
+/// modifiers go first, because those with fewer would match too.
 pub(crate) fn pressed(ctx: &Context) -> Option<&'static Entry> {
     static KEYS: LazyLock<Vec<(KeyboardShortcut, usize)>> = LazyLock::new(|| {
         let keys = |(index, entry): (usize, &Entry)| {
@@ -151,7 +151,7 @@ pub(crate) fn pressed(ctx: &Context) -> Option<&'static Entry> {
     })
 }
 
-/// `help` with the keys of the command `id` behind it.
+/// Appends the shortcut of the command `id` to `help`.
 pub(crate) fn with_keys(ctx: &Context, help: &str, id: &str) -> String {
     let keys = ALL.iter().find(|entry| entry.id == id).map(|entry| entry.keys_text(ctx)).unwrap_or_default();
     if keys.is_empty() { help.to_owned() } else { format!("{help} ({keys})") }

@@ -11,13 +11,13 @@ use crate::widgets::hint_ui;
 #[derive(Default)]
 pub(crate) struct Palette {
     filter: String,
-    /// Which of the found ones Enter takes.
+    /// Index of the match that Enter takes.
     chosen: usize,
     has_focus: bool,
 }
 
 impl Palette {
-    /// Draws it; says whether it stays open.
+    /// Draws the palette; returns whether it stays open.
     pub(crate) fn ui(&mut self, situation: &Situation<'_>, commands: &Commands, ctx: &Context) -> bool {
         let modal = Modal::new(egui::Id::unique("palette")).show(ctx, |ui| {
             ui.set_width(520.0_f32.min(ctx.content_rect().width() - 40.0).max(0.0));
@@ -61,7 +61,7 @@ impl Palette {
         open
     }
 
-    /// Says whether the palette stays open.
+    /// Returns whether the palette stays open.
     fn row_ui(
         &self,
         (row, index): (usize, usize),
@@ -98,7 +98,7 @@ impl Palette {
     }
 }
 
-/// Commands that have all letters of `filter` in their order in their names, the best first.
+/// Commands whose names contain all letters of `filter` in order, the best match first.
 pub(super) fn found(filter: &str) -> Vec<usize> {
     let filter = filter.trim().to_lowercase();
     let mut found: Vec<_> = ALL

@@ -229,7 +229,7 @@ impl Store {
         let failed_before = std::mem::replace(&mut self.failed, result.is_err());
         match result {
             Err(problem) => {
-                // ScoredCandidate again at the next look.
+                // They are saved again at the next attempt.
                 self.written = None;
                 self.taken.append(&mut self.in_job);
                 (!failed_before).then_some(Err(problem))
@@ -353,7 +353,7 @@ mod tests {
     }
 
     #[test]
-    fn a_window_without_a_slot_says_so() {
+    fn a_window_without_a_slot_is_reported() {
         let folder = Folder::new("full");
         let mut windows: Vec<_> = (0..SLOTS).map(|_| open(&folder.0)).collect();
         assert!(windows.iter().all(|window| window.problem.is_none()));

@@ -295,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn keys_of_a_model_file_are_told_in_words_with_their_units() {
+    fn keys_of_a_model_file_are_described_with_their_units() {
         for (key, words_of_it) in [
             ("lqr.q_diagonal[3]", "pitch weight"),
             ("robot.body_mass_kg", "body mass [kg]"),

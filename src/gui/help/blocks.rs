@@ -23,7 +23,7 @@ const COLUMN_GAP: f32 = 14.0;
 pub(super) struct Drawn {
     /// Link that was clicked.
     pub(super) clicked: Option<Link>,
-    /// Rectangle of the requested table row.
+    /// Rectangle of the table row to show.
     pub(super) row: Option<Rect>,
 }
 

@@ -10,11 +10,11 @@ use super::pyramid::{Pyramid, Steps};
 
 /// Samples of a leaf of a pyramid.
 pub(super) const BLOCK: usize = 32;
-/// Samples of a chunk, which is what is dropped at once.
+/// Samples of a chunk, the unit in which the oldest are dropped.
 pub const CHUNK: usize = 512 * BLOCK;
 
-/// Tells a column apart from any other of this run of the program: two with the same one have the same samples, but
-/// for those that one of them has no more or not yet.
+/// Identifies a column within a run of the program: columns with the same identifier have the same samples, except
+/// for those that one of them has dropped or not received yet.
 #[derive(Debug, PartialEq, Eq)]
 struct Lineage(u64);
 
@@ -26,7 +26,7 @@ impl Default for Lineage {
 }
 
 impl Clone for Lineage {
-    /// What is appended to a clone is its own.
+    /// Returns another lineage, because a clone may grow differently.
     fn clone(&self) -> Self {
         Self::default()
     }
@@ -65,7 +65,7 @@ impl Chunks {
         true
     }
 
-    /// Same for as long as samples are only appended or dropped at the start.
+    /// Lineage: unchanged as long as samples are only appended or dropped at the start.
     pub(super) fn lineage(&self) -> u64 {
         self.lineage.0
     }
@@ -109,7 +109,7 @@ impl<'a> Values<'a> {
         }
     }
 
-    /// What a worker can keep: a slice is copied, chunks are shared.
+    /// Copy for a worker: a slice is copied, chunks are shared.
     pub(super) fn held(self, range: Range<usize>) -> Held {
         match self {
             Self::Slice(values) => {
@@ -130,7 +130,7 @@ impl<'a> Values<'a> {
     }
 }
 
-/// Numbers of a range that stay as they are, whatever becomes of the column.
+/// Snapshot of a range that stays as it is when the column changes.
 #[derive(Clone, Debug)]
 pub(super) struct Held {
     values: HeldValues,

@@ -45,7 +45,7 @@ impl Cursors {
         }
     }
 
-    /// A press near a cursor takes hold of it. Whether a drag moves a cursor, and not what is behind it.
+    /// Starts to drag the cursor near a press. Returns whether a drag moves a cursor rather than the plot.
     pub(super) fn interact(&mut self, ui: &Ui, response: &Response, transform: &PlotTransform) -> bool {
         if response.drag_started_by(PointerButton::Primary) {
             let pressed = ui.input(|input| input.pointer.press_origin());

@@ -36,7 +36,7 @@ pub enum Data<'a> {
 }
 
 impl Data<'_> {
-    /// Same for as long as what is there stays as it is, though more may come and the oldest go.
+    /// Lineages of both columns: unchanged as long as samples are only appended or dropped at the start.
     fn lineages(&self, generation: u64) -> [u64; 2] {
         match self {
             Self::Fixed(x, _) => [generation, x.len() as u64],
@@ -215,7 +215,7 @@ impl<'a> Indexed<'a> {
         self.visible_of(range, columns, &mut DrawCache::default(), [0; 4])
     }
 
-    /// Same with what is `kept` of it; see [`DrawCache::draw`] for `of`.
+    /// Same as [`Self::visible`], with the columns `kept` from the last frame; see [`DrawCache::draw`] for `of`.
     fn visible_of(&self, range: [f64; 2], columns: usize, kept: &mut DrawCache, of: [u64; 4]) -> Visible {
         let valid = range[0].is_finite() && range[1].is_finite() && range[1] > range[0] && columns > 0;
         if self.length == 0 || !valid {
@@ -295,7 +295,7 @@ impl DecimationCache {
         self.visible_of(Data::Fixed(x, y), [scale, gap], generation, range, columns)
     }
 
-    /// Same for any data; `look` is the scale and the largest step that is no gap.
+    /// Same as [`Self::visible`], for any data; `look` is the scale and the largest step that is no gap.
     pub(super) fn visible_of(
         &mut self,
         data: Data<'_>,

@@ -30,7 +30,7 @@ struct Column {
 /// Columns next to each other.
 #[derive(Default)]
 pub(super) struct DrawCache {
-    /// What they are columns of: the data, their look and the width.
+    /// Key of the columns: the data, their look and the width.
     of: Option<[u64; 5]>,
     columns: VecDeque<Column>,
 }

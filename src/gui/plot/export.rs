@@ -43,7 +43,7 @@ impl FileKind for FigureKind {
     }
 }
 
-/// A figure to be saved: of which stack, and as what.
+/// Figure to save: its stack and its format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FigureFile {
     /// Name of the stack.
@@ -53,12 +53,12 @@ pub struct FigureFile {
 }
 
 impl FigureFile {
-    /// Name that a dialog offers.
+    /// Name that the file dialog suggests.
     pub(crate) fn suggestion(self) -> String {
         format!("{}.{}", self.stack, self.kind.extension())
     }
 
-    /// Hands the stack what a dialog brought; it saves when it is drawn next.
+    /// Passes the result of a dialog to the stack, which saves when it is drawn next.
     pub(crate) fn answer(self, ctx: &Context, answer: Result<PathBuf, String>) {
         ctx.data_mut(|data| data.insert_temp(answer_id(self.stack), Answer(Some((self.kind, answer)))));
         ctx.request_repaint();
@@ -74,7 +74,7 @@ fn answer_id(stack: &'static str) -> Id {
 #[derive(Clone, Default)]
 struct Answer(Option<(FigureKind, Result<PathBuf, String>)>);
 
-/// Returns the file contents; `sources` describe the curves.
+/// Figure as data, ready to be written in its format.
 pub(super) enum Figure {
     Log { x_key: &'static str, curves: Vec<(String, Snapshot)>, sources: Vec<String> },
     Chart(Box<Chart>, [f64; 2]),
@@ -90,7 +90,7 @@ const WORDS: Words<FigureKind> = Words {
     },
 };
 
-/// The form that saves, and the size of an SVG.
+/// Form that saves a figure.
 pub(super) struct Export {
     pub(super) open: bool,
     form: SaveForm<FigureKind>,
@@ -150,7 +150,7 @@ impl Export {
         request
     }
 
-    /// Starts to write; what cannot be is said in the form.
+    /// Starts writing; the form shows errors.
     pub(super) fn start(
         &mut self,
         ctx: &Context,
@@ -175,7 +175,7 @@ impl Export {
         self.form.problem = begun.err();
     }
 
-    /// A sentence when something was written, or could not be.
+    /// Returns a sentence when a file was written or could not be.
     pub(super) fn drain(&mut self) -> Option<Result<String, String>> {
         self.form.drain()
     }
@@ -192,7 +192,7 @@ fn size_ui(ui: &mut Ui, size_px: &mut [f64; 2]) {
 /// Rows between two reports of progress.
 const WATCH_ROWS: usize = 8192;
 
-/// One row for each time of any curve; a cell is empty where a curve has no sample then.
+/// Writes one row for each time of any curve; the cell of a curve without a sample is empty.
 fn csv(
     x_key: &str,
     curves: &[(String, Snapshot)],
@@ -231,7 +231,7 @@ fn csv(
     log.finish()
 }
 
-/// A comment ends with its line.
+/// Joins lines, because a comment ends with its line.
 fn one_line(text: &str) -> String {
     text.split(['\n', '\r']).collect::<Vec<_>>().join(" ")
 }

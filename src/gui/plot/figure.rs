@@ -5,7 +5,7 @@ use flqr_core::report::{Axis, Chart, Limit, Mark, Panel, Series};
 
 use crate::widgets::plain;
 
-/// Columns that a figure is drawn of: two points each.
+/// Number of columns of a figure, with two points each.
 pub(super) const COLUMNS: usize = 2000;
 
 /// A plot as a panel of a chart; curves with their names, in the shown unit.

@@ -34,7 +34,7 @@ pub(super) fn step_response(curve: &Indexed<'_>, range: Range<usize>) -> StepRes
     };
     let (start, end) = (curve.y(range.start), tail.mean);
     let change = end - start;
-    // What changes less than it moves at the end has not been requested a step.
+    // A signal that changes less than it moves at the end has no step.
     if change == 0.0 || change.abs() <= tail.std {
         return none;
     }
@@ -92,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_settle_or_does_not_change_says_so() {
+    fn a_curve_that_does_not_settle_or_change_is_reported() {
         let x: Vec<f64> = (0..1000).map(f64::from).collect();
         let swing: Vec<f64> = x.iter().map(|x| if x % 2.0 < 1.0 { 1.0 } else { -1.0 }).collect();
         let ramp = x.clone();

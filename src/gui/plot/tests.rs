@@ -86,7 +86,7 @@ fn reading(window: &Window, name: &str) -> String {
 }
 
 #[test]
-fn a_gap_is_drawn_at_every_zoom_and_told_in_words() {
+fn a_gap_is_drawn_at_every_zoom_and_reported() {
     let mut window = open(vec2(900.0, 600.0));
     window.get_by_label_contains("plot of pitch [rad], 0.00 to 1.10; pitch: mean 0.9");
     window.get_by_label_contains("998 samples");
@@ -202,7 +202,7 @@ fn the_spectrum_names_its_strongest_frequency() {
 }
 
 #[test]
-fn the_visible_range_is_saved_and_nothing_is_replaced_unasked() {
+fn the_visible_range_is_saved_and_files_are_replaced_only_after_a_question() {
     let folder = std::env::temp_dir().join(format!("flqr-figure-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
     let mut window = open(vec2(1100.0, 700.0));

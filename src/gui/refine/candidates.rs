@@ -1,4 +1,4 @@
-//! Every effect that was tried, best first, and outcome.
+//! Every candidate effect with its outcome, the best first.
 
 use egui::{Grid, RichText, Sense, Ui, vec2};
 use flqr_core::refine::{Outcome, Refinement, ScoredCandidate, Verdict};

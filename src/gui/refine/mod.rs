@@ -146,7 +146,7 @@ impl RefineTab {
         }
     }
 
-    /// Does what the page requested.
+    /// Applies a request of the page.
     ///
     /// # Errors
     /// A sentence says why it was not done.

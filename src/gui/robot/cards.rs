@@ -17,7 +17,7 @@ const CARDS: usize = 5;
 /// A reading older than this is marked.
 const OLD: Duration = Duration::from_millis(200);
 
-/// All cards, in as many rows as the width asks for.
+/// Draws all cards, in as many rows as the width requires.
 pub(super) fn cards_ui(status: &Status, ui: &mut Ui) {
     let spacing = ui.spacing().item_spacing.x;
     let room = ui.available_width();
@@ -152,7 +152,7 @@ fn load_ui(load: Option<f64>, ui: &mut Ui) {
     });
 }
 
-/// A name at the left and its value at the right.
+/// Draws a name at the left and its value at the right.
 pub(super) fn row_ui(ui: &mut Ui, name: &str, value: &str, color: Option<Color32>) -> egui::Response {
     ui.horizontal(|ui| {
         ui.label(RichText::new(name).small().weak());

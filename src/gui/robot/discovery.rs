@@ -6,7 +6,7 @@ use flqr_core::device::{Advice, CanInterface, Interfaces, SerialPort};
 use crate::theme::palette;
 use crate::widgets::{hint_ui, mono, warning_ui};
 
-/// CAN interfaces to choose from; without one, how to get one.
+/// Draws the CAN interfaces to choose from; without any, the commands that create one.
 pub(super) fn can_ui(found: Option<&Interfaces>, chosen: &mut String, ui: &mut Ui) {
     let Some(found) = found else {
         hint_ui(ui, "Looking for CAN interfaces…");
@@ -31,7 +31,7 @@ pub(super) fn can_ui(found: Option<&Interfaces>, chosen: &mut String, ui: &mut U
     }
 }
 
-/// Serial ports to choose from.
+/// Draws the serial ports to choose from.
 pub(super) fn ports_ui(found: Option<&Interfaces>, chosen: &mut String, ui: &mut Ui) {
     let Some(found) = found else {
         hint_ui(ui, "Looking for serial ports…");
@@ -45,7 +45,7 @@ pub(super) fn ports_ui(found: Option<&Interfaces>, chosen: &mut String, ui: &mut
     }
 }
 
-/// One line: the name, and how it stands.
+/// Draws a line with the name and the state of an interface.
 fn offer_ui(name: &str, text: &str, usable: bool, chosen: &mut String, ui: &mut Ui) {
     ui.horizontal(|ui| {
         let button = Button::selectable(chosen == name, mono(name));
@@ -79,7 +79,7 @@ fn bit_rate(rate: u32) -> String {
     if rate < 1e6 { format!("{} kbit/s", rate / 1e3) } else { format!("{} Mbit/s", rate / 1e6) }
 }
 
-/// Commands with a button each that copies them.
+/// Draws commands, each with a button that copies it.
 fn commands_ui(commands: &[String], ui: &mut Ui) {
     for command in commands {
         ui.horizontal(|ui| {

@@ -8,7 +8,7 @@ use flqr_core::device::{Event, EventKind};
 use crate::theme::palette;
 use crate::widgets::{hint_ui, section_ui};
 
-/// Events that are kept.
+/// Largest number of stored events.
 const KEPT: usize = 500;
 
 /// The newest events.

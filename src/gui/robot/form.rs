@@ -78,10 +78,10 @@ pub(crate) struct ConnectionForm {
     pub(crate) imu_baud: String,
     pub(crate) replay: String,
     pub(super) replay_speed: f64,
-    /// Path of a DBC file and which of its signals are what; empty if the motors speak the protocol of the model.
+    /// Path of a DBC file and the assignment of its signals; empty if the motors speak the protocol of the model.
     dbc: String,
     signals: String,
-    /// Never kept: a robot is listened to until somebody says otherwise.
+    /// Never saved: a connection is listen-only until the operator chooses otherwise.
     #[serde(skip)]
     pub(super) may_drive: bool,
     #[serde(skip)]
@@ -132,7 +132,7 @@ impl ConnectionForm {
         self.imu_baud = imu.baud.to_string();
     }
 
-    /// The command that connects as this form would.
+    /// Command line that connects with these settings.
     pub(crate) fn command_line(
         &self,
         source: Source,
@@ -151,12 +151,12 @@ impl ConnectionForm {
         self.signals.split([' ', ',', ';', '\n']).filter(|word| !word.is_empty()).collect()
     }
 
-    /// For a session file: all but what arms a robot.
+    /// Value for a session file: all settings except those that arm a robot.
     pub(crate) fn to_value(&self) -> serde_json::Value {
         serde_json::to_value(self).expect("strings and finite numbers always have a JSON form")
     }
 
-    /// From a session file.
+    /// Takes over the value of a session file.
     pub(crate) fn take_value(&mut self, value: &serde_json::Value) -> Result<(), String> {
         let read: Self =
             serde_json::from_value(value.clone()).map_err(|_| "“connection” cannot be read".to_owned())?;
@@ -168,7 +168,7 @@ impl ConnectionForm {
         Ok(())
     }
 
-    /// Options of the connection; an error sentence if something is missing.
+    /// Returns the options of the connection, or an error sentence if something is missing.
     pub(crate) fn options(
         &self,
         source: Source,
@@ -224,7 +224,7 @@ impl ConnectionForm {
         Ok(Some(SerialAddress { port: port.to_owned(), baud: rate(&self.imu_baud, "The IMU's baud rate")? }))
     }
 
-    /// Another robot, where its frames come over a wire or from a recording.
+    /// DBC description of another robot, if its frames come from a bus or a recording.
     fn described(&self, source: Source) -> Result<Option<Described>, String> {
         let file = self.dbc.trim();
         if file.is_empty() || !matches!(source, Source::Can | Source::Slcan | Source::Replay) {
@@ -255,7 +255,7 @@ impl ConnectionForm {
         }
     }
 
-    /// The form; `found` is what there is to connect to, once that is known.
+    /// Draws the form; `found` lists the available connections, once they are known.
     pub(super) fn ui(&mut self, context: &ViewContext<'_>, found: Option<&Interfaces>, ui: &mut Ui) {
         let wired = matches!(context.source, Source::Can | Source::Slcan);
         section_ui(ui, "Connection", |ui| {
@@ -435,7 +435,7 @@ impl ConnectionForm {
     }
 }
 
-/// A speed of replays, for a form and a running one; says whether it was changed.
+/// Draws the replay speed, in the form and while a replay runs; returns whether it was changed.
 pub(super) fn speed_ui(speed: &mut f64, ui: &mut Ui) -> bool {
     let [least, greatest] = REPLAY_SPEEDS;
     let before = *speed;

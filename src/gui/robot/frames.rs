@@ -1,4 +1,4 @@
-//! The newest raw frames, with a filter. What passes it is kept apart, so that drawing costs what is visible.
+//! The newest raw frames, with a filter. Frames that pass it are stored separately, so that only visible rows are drawn.
 
 use std::collections::VecDeque;
 use std::fmt::Write;
@@ -9,10 +9,10 @@ use flqr_core::model::LinkSettings;
 
 use crate::widgets::{choice_ui, hint_ui, mono, section_ui};
 
-/// Frames that are kept, before and after the filter.
+/// Largest number of stored frames, before and after the filter.
 const KEPT: usize = 2000;
 
-/// Which way frames went that are shown.
+/// Directions of the frames that are shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Way {
     #[default]
@@ -21,7 +21,7 @@ enum Way {
     Sent,
 }
 
-/// Which frames are shown.
+/// Filter of the shown frames, as typed.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Filter {
     ids: String,
@@ -29,12 +29,12 @@ struct Filter {
     way: Way,
 }
 
-/// A filter that has been read.
+/// Parsed filter.
 #[derive(Clone, Debug, Default)]
 struct Test {
-    /// Any of these; all where there are none.
+    /// Shown identifiers; all if empty.
     ids: Vec<u32>,
-    /// In the bytes as hexadecimal digits without spaces, or in the meaning, in small letters.
+    /// Text to find in the bytes, as hexadecimal digits without spaces, or in the decoded text, in lower case.
     text: String,
     way: Way,
 }
@@ -76,7 +76,7 @@ impl Test {
     }
 }
 
-/// The table.
+/// Table of the newest frames.
 #[derive(Default)]
 pub(crate) struct FrameTable {
     all: VecDeque<StampedFrame>,
@@ -85,13 +85,13 @@ pub(crate) struct FrameTable {
     test: Test,
     problem: Option<String>,
     held: bool,
-    /// Those of the robot that the frames come from.
+    /// Settings of the robot that sends the frames.
     settings: LinkSettings,
     buffer: String,
 }
 
 impl FrameTable {
-    /// Takes frames in, unless the table is held.
+    /// Adds frames, unless the table is held.
     pub(super) fn extend(&mut self, frames: &[StampedFrame]) {
         if self.held {
             return;
@@ -104,7 +104,7 @@ impl FrameTable {
         }
     }
 
-    /// Forgets all frames; those that come are of a robot with these settings.
+    /// Removes all frames; new frames are those of a robot with these settings.
     pub(super) fn begin(&mut self, settings: LinkSettings) {
         self.settings = settings;
         self.all.clear();
@@ -272,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn a_filter_that_cannot_be_read_is_told_and_changes_nothing() {
+    fn an_invalid_filter_is_reported_and_changes_nothing() {
         let mut table = table();
         table.filter.ids = "wheel".to_owned();
         table.refilter();

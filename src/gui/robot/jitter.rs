@@ -1,4 +1,4 @@
-//! Lateness of the control loop's ticks: a histogram with logarithmic bins, and what a reader would measure in it.
+//! Lateness of the control loop's ticks: a histogram with logarithmic bins, median, 99th percentile and largest value.
 
 use std::time::Duration;
 
@@ -15,7 +15,7 @@ const LABELS: f32 = 15.0;
 const LABELLED: [(f64, &str); 5] =
     [(1e-6, "1 µs"), (1e-5, "10 µs"), (1e-4, "0.1 ms"), (1e-3, "1 ms"), (1e-2, "10 ms")];
 
-/// The card.
+/// Draws the card.
 pub(super) fn jitter_ui(timing: &Timing, ui: &mut Ui) {
     title_ui(ui, "Loop jitter");
     if timing.ticks == 0 {

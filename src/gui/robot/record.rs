@@ -1,4 +1,4 @@
-//! Recording: where to, and how it stands.
+//! File and status of the recording.
 
 use std::path::PathBuf;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
@@ -19,7 +19,7 @@ pub(crate) struct RecordForm {
 }
 
 impl RecordForm {
-    /// A name that no recording of before has.
+    /// Suggests a name that no earlier recording has.
     pub(crate) fn suggest(&mut self) {
         self.path = format!("robot-{}.csv", stamp(SystemTime::now()));
     }

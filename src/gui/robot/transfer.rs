@@ -1,4 +1,4 @@
-//! Gains on their way from the design to the connected robot: manually, or as they change.
+//! Transfer of gains from the design to the connected robot: manually, or as they change.
 
 use egui::{Button, Frame, Grid, Margin, RichText, Stroke, Ui};
 use flqr_core::control::{
@@ -22,32 +22,32 @@ pub(crate) struct Transfer {
     /// True if a driven robot gets new gains as they change, rather than manually.
     pub(crate) follow: bool,
     running: Option<BalanceController>,
-    /// Gains that the operator has agreed to last: live changes go no further from them than the gate asks for.
+    /// Gains that the operator has confirmed last: live changes stay within the factor of the gate from these.
     agreed: Matrix2x4<f64>,
     pending: Option<Pending>,
 }
 
-/// A design that the robot does not run.
+/// Design that the robot does not run yet.
 pub(crate) struct Pending {
     design: BalanceController,
     pub(crate) verdict: Verdict,
 }
 
 impl Transfer {
-    /// A robot is connected with a controller.
+    /// Begins with the controller of a new connection.
     pub(super) fn begin(&mut self, controller: Option<BalanceController>) {
         self.agreed = controller.as_ref().map_or_else(Matrix2x4::zeros, |controller| controller.gain);
         (self.running, self.pending) = (controller, None);
     }
 
-    /// The robot is armed: whoever arms it agrees to its gains.
+    /// Takes arming as the confirmation of the gains of the robot.
     pub(super) fn note_armed(&mut self) {
         if let Some(running) = &self.running {
             self.agreed = running.gain;
         }
     }
 
-    /// Takes in the controller of the design; returns it if it is to be sent now.
+    /// Takes the controller of the design; returns it if it is to be sent now.
     pub(super) fn set_design(
         &mut self,
         robot: &RobotModel,
@@ -77,12 +77,12 @@ impl Transfer {
         sent
     }
 
-    /// The design that waits.
+    /// Pending design.
     pub(crate) fn pending(&self) -> Option<&Pending> {
         self.pending.as_ref()
     }
 
-    /// The design that waits, to be sent manually of the operator; none if it is refused.
+    /// Takes the pending design, to be sent at the request of the operator; `None` if it is refused.
     pub(super) fn take(&mut self) -> Option<BalanceController> {
         let Pending { design, .. } =
             self.pending.take_if(|pending| !matches!(pending.verdict, Verdict::Refuse(_)))?;
@@ -91,7 +91,7 @@ impl Transfer {
         Some(design)
     }
 
-    /// Same for a design that was refused or waited while the robot was driven, now that it is not.
+    /// Takes a design that was refused or pending while the robot was driven, now that it is not.
     pub(super) fn take_again(&mut self, robot: &RobotModel) -> Option<BalanceController> {
         let design = self.pending.as_ref()?.design.clone();
         self.set_design(robot, design, false)
@@ -114,7 +114,7 @@ impl Transfer {
 }
 
 impl Pending {
-    /// Reason why it must not be sent to the robot.
+    /// Reason for which it must not be sent to the robot.
     pub(crate) fn refusal(&self) -> Option<String> {
         match &self.verdict {
             Verdict::Refuse(refusal) => Some(sentence(&refusal.to_string())),
@@ -123,7 +123,7 @@ impl Pending {
     }
 }
 
-/// Returns whether a robot would do the same under both: torque limit, yaw hold and odometry stay those of the
+/// Returns whether both control a robot identically: torque limit, yaw hold and odometry stay those of the
 /// connection.
 fn is_same(a: &BalanceController, b: &BalanceController) -> bool {
     (a.gain, a.feedforward, &a.effects) == (b.gain, b.feedforward, &b.effects)
@@ -144,7 +144,7 @@ pub(super) fn choice_of_transfer_ui(context: &ViewContext<'_>, ui: &mut Ui) {
     });
 }
 
-/// The differences between the gains of the robot and those of the design, and the button that applies them.
+/// Draws the differences between the gains of the robot and of the design, and the button that applies them.
 pub(crate) fn pending_ui(context: &ViewContext<'_>, ui: &mut Ui) {
     let transfer = &context.link.transfer;
     let (Some(pending), Some(running)) = (transfer.pending(), &transfer.running) else { return };
@@ -168,7 +168,7 @@ pub(crate) fn pending_ui(context: &ViewContext<'_>, ui: &mut Ui) {
     ui.add_space(4.0);
 }
 
-/// The button that applies the design.
+/// Draws the button that applies the design.
 pub(super) fn apply_ui(link: &Link, commands: &Commands, ui: &mut Ui) {
     let Some(pending) = link.transfer.pending() else { return };
     let refusal = pending.refusal();
@@ -193,7 +193,7 @@ fn changes_ui(running: &BalanceController, design: &BalanceController, ui: &mut 
     }
 }
 
-/// One row for each gain; motors with equal gains share it.
+/// Draws one row for each gain; motors with equal gains have a common one.
 pub(crate) fn change_rows_ui(changes: &[GainChange], ui: &mut Ui) {
     let both = |change: &GainChange| {
         let is_twin = |other: &GainChange| {

@@ -211,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn curves_that_were_asked_for_stay_however_long_and_others_make_room() {
+    fn requested_curves_are_kept_and_others_make_room() {
         let mut ledger = Ledger::default();
         let long = |values: usize| Series { time_s: vec![0.0; values], channels: Vec::new() };
         for _ in 0..3 {

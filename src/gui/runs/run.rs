@@ -234,7 +234,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn weights_are_told_whether_they_are_full_or_diagonal() {
+    fn full_and_diagonal_weights_are_described() {
         assert_eq!(run(1, &presets::paper()).weights(), "2 0.01 58.5 0.01 | 1 1");
     }
 }

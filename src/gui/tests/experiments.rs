@@ -334,7 +334,7 @@ fn a_new_run_forgets_what_belonged_to_the_last() {
 }
 
 #[test]
-fn an_entry_beyond_the_limits_says_so() {
+fn an_entry_beyond_the_limits_is_reported() {
     let mut window = page();
     let hints = |window: &Window| window.query_all_by_label_contains("was limited").count();
     for (field, key, typed, taken, limited) in [

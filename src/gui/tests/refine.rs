@@ -155,7 +155,7 @@ fn an_effect_that_is_not_ticked_stays_out_of_what_is_saved_and_used() {
 }
 
 #[test]
-fn what_is_stale_says_so_in_the_page_and_in_the_file() {
+fn an_outdated_result_is_marked_on_the_page_and_in_the_file() {
     let log = TempFile::new("stale.csv", &log_csv(COGGING, 6));
     let report = TempFile::new("stale.html", "");
     std::fs::remove_file(&report.0).unwrap();

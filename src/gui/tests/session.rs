@@ -495,7 +495,7 @@ fn closing_asks_only_where_changes_would_be_lost() {
 }
 
 #[test]
-fn a_letter_answers_a_question_and_the_focused_answer_is_told() {
+fn a_letter_answers_a_question_and_the_focused_answer_is_reported() {
     let mut window = open(options(Tab::Tune), SIZE);
     enter(&mut window, "pitch weight", "250");
     let ask = |window: &mut Window| {
@@ -565,7 +565,7 @@ fn what_cannot_be_written_is_said_and_nothing_is_lost() {
 }
 
 #[test]
-fn the_tour_is_seen_once_and_comes_back_when_asked_for() {
+fn the_tour_is_shown_once_and_on_request() {
     let file = TempFile::new("tour.json", "{\"version\": 1}");
     let recent_file = Some(file.0.clone());
     let begin = WindowOptions { tour: true, recent_file, ..options(Tab::Tune) };

@@ -187,7 +187,7 @@ fn margins_have_a_verdict_and_a_sentence_and_poles_a_list() {
 }
 
 #[test]
-fn weights_without_a_design_leave_the_last_gains_in_force_and_say_so() {
+fn weights_without_a_design_leave_the_last_gains_active_and_are_reported() {
     let mut window = open(options(Tab::Tune), SIZE);
     let before = state(&window);
     enter(&mut window, "left torque weight", "-1");
@@ -681,7 +681,7 @@ fn a_hundred_frames_of_random_input_do_no_harm() {
 }
 
 #[test]
-fn margins_are_told_for_the_delay_that_the_model_has() {
+fn margins_are_those_of_the_delay_of_the_model() {
     let of = |delay_s: f64| {
         let text = format!("{ROBOT}[actuation]\ndelay_s = {delay_s}\n");
         let model = Model::from_toml(&text, "test.toml").unwrap();

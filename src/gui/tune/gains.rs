@@ -1,4 +1,4 @@
-//! Gains of the design active, and the controller that they are part of.
+//! Gains of the active design, and the controller that they are part of.
 
 use egui::{Grid, RichText, Ui};
 use flqr_core::control::ControllerKind;

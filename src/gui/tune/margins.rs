@@ -23,7 +23,7 @@ struct Row {
     then: String,
 }
 
-/// The margins of the design active.
+/// The margins of the active design.
 pub(super) fn ui(designed: &Designed, poles: &[SampledPole], ui: &mut Ui) {
     let runs = runs(designed);
     section_ui(ui, "Stability", |ui| {

@@ -88,7 +88,7 @@ impl PolePlane {
         ui.scope(|ui| choice_ui(ui, &mut self.plane, &choices));
     }
 
-    /// Draws the poles of the design active and of the other one.
+    /// Draws the poles of the active design and of the other one.
     pub(super) fn ui(
         &mut self,
         context: &ViewContext<'_>,

@@ -65,7 +65,7 @@ struct Response {
     poles: Vec<SampledPole>,
 }
 
-/// Predictions for the design active and for the other one.
+/// Predictions for the active design and for the other one.
 pub(super) struct Predicted {
     now: Response,
     other: Response,
@@ -89,7 +89,7 @@ impl Default for Predicted {
 }
 
 impl Predicted {
-    /// Poles of the design active, of the sampled loop.
+    /// Poles of the active design, of the sampled loop.
     pub(super) fn poles(&mut self, context: &ViewContext<'_>, trials: &Trials) -> &[SampledPole] {
         self.update(context, trials.shown());
         &self.now.poles

@@ -57,7 +57,7 @@ struct Question {
     trials: [Disturbance; 3],
 }
 
-/// Peak torques of the design active and of the other, N m.
+/// Peak torques of the active design and of the other one, N m.
 #[derive(Clone, Copy)]
 struct Peaks {
     trials: [Disturbance; 3],
@@ -115,7 +115,7 @@ impl Trials {
         }
     }
 
-    /// Peak torques for the shown disturbance of the design active and of the other one, N m.
+    /// Peak torques for the shown disturbance, of the active design and of the other one, N m.
     pub(super) fn shown_peaks_nm(&mut self, context: &ViewContext<'_>) -> [f64; 2] {
         let shown = self.shown;
         self.peaks_nm(context).map(|peaks| peaks[shown])
