@@ -315,7 +315,7 @@ fn end(window: &mut Window) -> Option<String> {
 fn a_stopped_robot_is_not_left_before_its_motors_have_confirmed_that_they_are_off() {
     let script = Script::default();
     let mut window = drive_window(&script);
-    arm(&mut window, &script);
+    arm_by_orders(&mut window, &script);
     let reason = StopReason::Tilt { pitch_rad: 0.6 };
     tell(&mut window, &script, not_off(2.0, reason));
     assert_eq!(state(&window)["robot_tab"]["motors_off"], false);
