@@ -296,7 +296,7 @@ mod tests {
         for (frame, text) in [
             (
                 Frame::data(FrameId::Standard(0x141), &[0x9C, 1]).unwrap(),
-                "     1.5000  tx       141  2  9C 01",
+                "     1.5000  tx       141  2  9C 01                    incomplete: 2 of 8 bytes",
             ),
             (
                 Frame::remote(FrameId::Extended(0x1ABCDE), 8).unwrap(),
