@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use flqr_core::device::{SerialAddress, Source};
 use flqr_core::model_file::presets;
 use flqr_gui::{Tab, WindowOptions};
@@ -24,8 +25,8 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     columns: Columns,
     /// Tab to show first
-    #[arg(long, value_enum)]
-    tab: Option<TabName>,
+    #[arg(long, value_parser = tab_parser())]
+    tab: Option<Tab>,
     /// Robot to connect to at start, listen-only: can:can0, slcan:/dev/ttyACM0@1000000, emulated, replay:FILE
     #[arg(long, value_name = "SOURCE")]
     source: Option<Source>,
@@ -45,15 +46,10 @@ pub(crate) struct Arguments {
     force: Force,
 }
 
-#[derive(Clone, Copy, PartialEq, ValueEnum)]
-enum TabName {
-    Tune,
-    Friction,
-    Refine,
-    Experiments,
-    Robot,
-    Log,
-    Runs,
+/// Reads the name of a page.
+fn tab_parser() -> impl TypedValueParser<Value = Tab> {
+    let names = PossibleValuesParser::new(Tab::ALL.map(Tab::key));
+    names.try_map(|name| Tab::from_key(&name).ok_or("unknown page"))
 }
 
 pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
@@ -63,15 +59,8 @@ pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
         Some(path) => input::load_model(path)?,
         None => presets::paper(),
     };
-    let tab = match (arguments.tab, &arguments.log) {
-        (Some(TabName::Friction), _) | (None, Some(_)) => Tab::Friction,
-        (Some(TabName::Refine), _) => Tab::Refine,
-        (Some(TabName::Experiments), _) => Tab::Experiments,
-        (Some(TabName::Robot), _) => Tab::Robot,
-        (Some(TabName::Log), _) => Tab::Log,
-        (Some(TabName::Runs), _) => Tab::Runs,
-        (Some(TabName::Tune), _) | (None, None) => Tab::Tune,
-    };
+    let first = if arguments.log.is_some() { Tab::Friction } else { Tab::default() };
+    let tab = arguments.tab.unwrap_or(first);
     let usual = WindowOptions::new(model);
     let state_folder = flqr_gui::default_state_folder();
     let has_folders = state_folder.is_some() && usual.recent_file.is_some();

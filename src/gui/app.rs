@@ -7,7 +7,7 @@ mod shell;
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::rc::Rc;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -21,7 +21,7 @@ use flqr_core::model_file::RenamedKey;
 use crate::column_map::ColumnMapForm;
 use crate::command::{Command, Commands, FilePurpose, Source};
 use crate::commands::{Palette, Situation};
-use crate::context::ViewContext;
+use crate::context::AppState;
 use crate::design::Designer;
 use crate::dialog::{Answer, Dialog};
 use crate::document::{Base, Content, Document, Opened, Store, Undo};
@@ -34,13 +34,13 @@ use crate::job::{Job, Outcome, Waker};
 use crate::layout::{Layout, Node};
 use crate::live::{Live, LiveCommand};
 use crate::messages::{Messages, Severity};
+use crate::pages::{Pages, Tab};
 use crate::recent::{Recent, RecentFile};
 use crate::refine::{RefineCommand, RefineTab};
 use crate::robot::{Link, RobotTab, sentence};
 use crate::runs::{Ledger, RunsTab};
 use crate::session::Session;
 use crate::state_out::{ABOUT, StateOut};
-use crate::tab::Tab;
 use crate::tour::Tour;
 use crate::tune::TuneTab;
 use crate::window::WindowOptions;
@@ -54,9 +54,8 @@ enum ModelJob {
 
 /// The window's content.
 pub struct App {
-    session: Session,
-    /// The session as loaded or saved last, for the mark of unsaved changes and for Reset.
-    saved: Session,
+    state: AppState,
+    pages: Pages,
     /// The number of the loaded model in the undo.
     base: usize,
     undo: Undo,
@@ -81,28 +80,13 @@ pub struct App {
     was_hot: bool,
     tour: Option<Tour>,
     tour_is_due: bool,
-    model_path: Option<PathBuf>,
-    /// The page that the user turned to last: what keys are about.
+    /// The page that the user turned to last, which shortcuts refer to.
     tab: Tab,
     layout: Layout,
     palette: Option<Palette>,
     help: Option<Help>,
-    source: Source,
     /// State that the simulated robot resumes.
     paused_before: bool,
-    designer: Designer,
-    live: Live,
-    history: History,
-    tune: TuneTab,
-    friction: FrictionTab,
-    refine: RefineTab,
-    experiments: ExperimentsTab,
-    link: Link,
-    robot: RobotTab,
-    runs: RunsTab,
-    commands: Commands,
-    messages: Messages,
-    recent: Recent,
     recent_file: Option<RecentFile>,
     recent_job: Option<Job<(), Recent>>,
     dialog: Option<Dialog>,
@@ -146,8 +130,30 @@ impl App {
             experiment: experiments.settings().clone(),
             layout: layout.node(),
         };
-        let mut app = Self {
+        let pages = Pages {
+            tune: TuneTab::new(&session, options.model_path.as_deref()),
+            friction: FrictionTab::new(column_map.clone()),
+            refine: RefineTab::new(column_map),
+            experiments,
+            robot: RobotTab::default(),
+            runs: RunsTab::default(),
+            log: Messages::default(),
+        };
+        let state = AppState {
             saved: session.clone(),
+            session,
+            model_path: options.model_path,
+            designer,
+            source: Source::default(),
+            live: Live::start(&waker, options.paused)?,
+            history: History::default(),
+            link: Link::new(options.devices),
+            recent: Recent::default(),
+            commands: Commands::default(),
+        };
+        let mut app = Self {
+            state,
+            pages,
             base: 0,
             undo: Undo::new(content, base),
             ledger: 0,
@@ -165,27 +171,11 @@ impl App {
             was_hot: false,
             tour: None,
             tour_is_due: options.tour,
-            tune: TuneTab::new(&session, options.model_path.as_deref()),
-            session,
-            model_path: options.model_path,
             tab: options.tab,
             layout,
             palette: None,
             help: None,
-            source: Source::default(),
             paused_before: options.paused,
-            designer,
-            live: Live::start(&waker, options.paused)?,
-            history: History::default(),
-            friction: FrictionTab::new(column_map.clone()),
-            refine: RefineTab::new(column_map),
-            experiments,
-            link: Link::new(options.devices),
-            robot: RobotTab::default(),
-            runs: RunsTab::default(),
-            commands: Commands::default(),
-            messages: Messages::default(),
-            recent: Recent::default(),
             recent_job: read_recent(options.recent_file.clone(), &waker)?,
             recent_file: options.recent_file.map(RecentFile::new),
             dialog: None,
@@ -201,27 +191,27 @@ impl App {
         app.reset_live();
         app.say_loaded();
         if let Some(warning) = options.warning {
-            app.messages.stand(warning);
+            app.pages.log.stand(warning);
         }
         if let Some(log) = options.log {
-            app.commands.send(match options.tab {
-                Tab::Refine => Command::Refine(RefineCommand::Load { path: log, held_out: false }),
+            app.state.commands.send(match options.tab {
+                Tab::Refine => RefineCommand::Load { path: log, held_out: false }.into(),
                 _ => Command::LoadLog(log),
             });
         }
         if let Some(session) = options.session {
-            app.commands.send(Command::OpenSession(session));
+            app.state.commands.send(Command::OpenSession(session));
         }
         if let Some(imu) = &options.imu {
-            app.robot.form.fill_imu(imu);
+            app.pages.robot.form.fill_imu(imu);
         }
         if let Some(source) = &options.source {
-            app.robot.form.fill(source);
-            app.commands.send(Command::SelectSource(source.into()));
-            app.commands.send(Command::Connect);
+            app.pages.robot.form.fill(source);
+            app.state.commands.send(Command::SelectSource(source.into()));
+            app.state.commands.send(Command::Connect);
         }
         if options.tab == Tab::Robot {
-            app.commands.send(Command::RefreshInterfaces);
+            app.state.commands.send(Command::RefreshInterfaces);
         }
         Ok(app)
     }
@@ -234,12 +224,12 @@ impl App {
         self.drain_jobs();
         self.take_dropped_files(ctx);
         if self.layout.shows(Tab::Experiments) {
-            self.experiments.advance(ctx);
+            self.pages.experiments.advance(ctx);
         }
-        for command in self.commands.take() {
+        for command in self.state.commands.take() {
             self.apply(command, ctx);
         }
-        let is_hot = self.link.is_hot();
+        let is_hot = self.state.link.is_hot();
         if is_hot && !self.was_hot {
             self.palette = None;
         }
@@ -254,7 +244,7 @@ impl App {
     /// Draws the window.
     pub fn ui(&mut self, ui: &mut Ui) {
         self.shell_ui(ui);
-        if !self.commands.is_empty() {
+        if !self.state.commands.is_empty() {
             // Drawn again in this same frame, after `logic` has applied them.
             ui.ctx().request_discard("commands change what is shown");
         }
@@ -264,21 +254,21 @@ impl App {
     fn situation(&self, ctx: &Context) -> Situation<'_> {
         Situation {
             tab: self.tab,
-            source: self.source,
-            paused: self.live.status.paused,
-            replay_is_paused: self.link.replay_is_paused,
-            has_robot: self.session.robot().is_some(),
-            has_reference: self.designer.reference.is_some(),
-            has_log: self.friction.has_log(),
-            fit_runs: self.friction.fit_is_running(),
-            refine_runs: self.refine.is_running(),
-            has_residual: self.refine.has_residual(),
-            experiment_runs: self.experiments.is_running(),
-            is_connected: self.link.options().is_some(),
-            is_hot: self.link.is_hot(),
-            gains_wait: self.link.transfer.pending().is_some(),
-            controller: self.session.controller,
-            model_path: self.model_path.as_deref(),
+            source: self.state.source,
+            paused: self.state.live.status.paused,
+            replay_is_paused: self.state.link.replay_is_paused,
+            has_robot: self.state.session.robot().is_some(),
+            has_reference: self.state.designer.reference.is_some(),
+            has_log: self.pages.friction.has_log(),
+            fit_runs: self.pages.friction.fit_is_running(),
+            refine_runs: self.pages.refine.is_running(),
+            has_residual: self.pages.refine.has_residual(),
+            experiment_runs: self.pages.experiments.is_running(),
+            is_connected: self.state.link.options().is_some(),
+            is_hot: self.state.link.is_hot(),
+            gains_wait: self.state.link.transfer.pending().is_some(),
+            controller: self.state.session.controller,
+            model_path: self.state.model_path.as_deref(),
             can_undo: self.undo.peek(false).is_some(),
             can_redo: self.undo.peek(true).is_some(),
             is_dark: ctx.global_style().visuals.dark_mode,
@@ -288,32 +278,10 @@ impl App {
     }
 
     fn page_ui(&mut self, ui: &mut Ui) {
-        let context = ViewContext {
-            session: &self.session,
-            model_path: self.model_path.as_deref().filter(|_| self.session == self.saved),
-            saved: &self.saved,
-            designer: &self.designer,
-            history: if self.source == Source::Simulated { &self.history } else { &self.link.history },
-            live: &self.live.status,
-            link: &self.link,
-            recent: &self.recent,
-            source: self.source,
-            commands: &self.commands,
-        };
-        let (tune, friction, experiments) = (&mut self.tune, &mut self.friction, &mut self.experiments);
-        let (refine, robot, messages) = (&mut self.refine, &mut self.robot, &mut self.messages);
-        let runs = &mut self.runs;
-        let mut stop = false;
+        let context = self.state.context();
+        let mut pages = self.pages.all_mut();
         let before = self.layout.shown().to_vec();
-        let turned_to = self.layout.ui(ui, &mut |tab, ui| match tab {
-            Tab::Tune => tune.ui(&context, ui),
-            Tab::Friction => friction.ui(&context, ui),
-            Tab::Refine => refine.ui(&context, ui),
-            Tab::Experiments => experiments.ui(&context, ui),
-            Tab::Robot => stop |= robot.ui(&context, ui),
-            Tab::Runs => runs.ui(&context, ui),
-            Tab::Log => messages.ui(ui),
-        });
+        let turned_to = self.layout.ui(ui, &mut |tab, ui| pages[tab as usize].ui(&context, ui));
         let front = || self.layout.shown().first().copied().filter(|_| !self.layout.shows(self.tab));
         if let Some(tab) = turned_to.or_else(front) {
             self.tab = tab;
@@ -321,28 +289,20 @@ impl App {
         if self.layout.shown() != before {
             self.set_live_interval();
         }
-        if stop {
-            self.link.stop();
-        }
-    }
-
-    /// The file that holds the very model of the session, if there is one.
-    fn model_path_of_session(&self) -> Option<&Path> {
-        self.model_path.as_deref().filter(|_| self.session == self.saved)
     }
 
     fn drain_live(&mut self) {
-        let samples = self.live.poll();
+        let samples = self.state.live.poll();
         if !samples.is_empty() {
-            self.history.extend(&samples);
+            self.state.history.extend(&samples);
         }
     }
 
     fn drain_link(&mut self) {
-        let before = self.link.stage();
-        let (updates, messages) = self.link.drain();
+        let before = self.state.link.stage();
+        let (updates, messages) = self.state.link.drain();
         for update in &updates {
-            self.robot.note(update);
+            self.pages.robot.note(update);
         }
         // A recording that could not be started, for instance: said where it is seen from every page.
         let warning = |event: &&DeviceEvent| event.kind == EventKind::Warning;
@@ -351,7 +311,6 @@ impl App {
             self.fail(sentence(&warning.text));
         }
         self.watch_recording();
-        self.robot.drain();
         for message in messages {
             match message {
                 Ok(message) => {
@@ -362,7 +321,7 @@ impl App {
                 Err(problem) => {
                     self.fail(problem);
                     // What is there may have changed.
-                    self.robot.look(&self.link, &self.waker);
+                    self.pages.robot.look(&self.state.link, &self.waker);
                 }
             }
         }
@@ -371,14 +330,14 @@ impl App {
 
     /// A recording that has ended is a run.
     fn watch_recording(&mut self) {
-        let status = self.link.status.as_ref().filter(|_| self.link.is_open());
+        let status = self.state.link.status.as_ref().filter(|_| self.state.link.is_open());
         let recording = status.and_then(|status| status.recording.as_ref());
-        self.runs.watch(recording, self.source.name(), || self.session.model());
+        self.pages.runs.watch(recording, self.state.source.name(), || self.state.session.model());
     }
 
     /// The status line must not say what was true of the stage before.
     fn say_stage(&mut self, before: Option<Stage>) {
-        let stage = self.link.stage();
+        let stage = self.state.link.stage();
         let (Some(_), Some(now)) = (before, stage) else { return };
         if before == stage {
             return;
@@ -392,41 +351,24 @@ impl App {
     }
 
     fn drain_jobs(&mut self) {
-        for (severity, text) in [self.friction.drain(), self.refine.drain()].into_iter().flatten() {
-            self.messages.add(severity, text);
-        }
-        if let Some(message) = self.experiments.drain() {
-            self.say(message);
-        }
-        for problem in self.runs.drain() {
-            self.fail(problem);
-        }
-        self.experiments.note_runs(&mut self.runs);
-        self.friction.note_run(&mut self.runs);
-        self.refine.note_run(&mut self.runs);
-        for result in [self.experiments.drain_saver(), self.refine.drain_saver()].into_iter().flatten() {
-            match result {
-                Ok(message) => self.say(message),
-                Err(problem) => self.fail(problem),
-            }
-        }
-        if let Some((path, model)) = self.refine.take_saved_model()
-            && model == self.session.model()
+        self.pages.drain();
+        if let Some((path, model)) = self.pages.refine.take_saved_model()
+            && model == self.state.session.model()
         {
-            self.note_saved(persistence::absolute(path), self.session.clone());
+            self.note_saved(persistence::absolute(path), self.state.session.clone());
         }
         if let Some(job) = &mut self.recent_job {
             match job.poll().1 {
                 Outcome::Running => {}
                 Outcome::Done(read) => {
-                    if !self.refine.has_logs() {
-                        self.friction.suggest_column_map(&read.column_map);
+                    if !self.pages.refine.has_logs() {
+                        self.pages.friction.suggest_column_map(&read.column_map);
                     }
-                    self.robot.suggest(&read);
+                    self.pages.robot.suggest(&read);
                     if self.tour_is_due && !read.tour_done {
                         self.tour = Some(Tour::default());
                     }
-                    self.recent = read;
+                    self.state.recent = read;
                     self.recent_job = None;
                 }
                 Outcome::Broken => self.recent_job = None,
@@ -452,7 +394,7 @@ impl App {
         self.dialog = None;
         let asks_path = std::mem::take(&mut self.asks_path);
         match answer {
-            Answer::Chosen(path) => self.commands.send(apply::chosen(purpose, path)),
+            Answer::Chosen(path) => self.state.commands.send(apply::chosen(purpose, path)),
             Answer::Cancelled => {}
             Answer::Unavailable(problem) => {
                 match purpose {
@@ -463,33 +405,29 @@ impl App {
                 if asks_path {
                     self.ask_path(purpose, Some(problem.clone()));
                 }
-                self.tune.note_dialog_problem(purpose, &problem);
-                self.friction.note_dialog_problem(purpose, &problem);
-                self.experiments.note_dialog_problem(purpose, &problem);
-                self.robot.note_dialog_problem(purpose, &problem);
-                if let FilePurpose::Refine(purpose) = purpose {
-                    self.refine.note_dialog_problem(purpose, &problem);
+                for page in self.pages.all_mut() {
+                    page.note_dialog_problem(purpose, &problem);
                 }
                 if let FilePurpose::SaveFigure(file) = purpose {
-                    self.commands.send(Command::ChooseFigure(file, Err(problem)));
+                    self.state.commands.send(Command::ChooseFigure(file, Err(problem)));
                 }
             }
         }
     }
 
     fn save_recent(&mut self) {
-        self.recent.column_map = self.friction.column_map();
+        self.state.recent.column_map = self.pages.friction.column_map();
         if let Some(file) = &mut self.recent_file {
-            file.save(&self.recent, &self.waker);
+            file.save(&self.state.recent, &self.waker);
         }
     }
 
     fn say(&mut self, text: impl Into<String>) {
-        self.messages.add(Severity::Note, text);
+        self.pages.log.add(Severity::Note, text);
     }
 
     fn fail(&mut self, text: impl Into<String>) {
-        self.messages.add(Severity::Error, text);
+        self.pages.log.add(Severity::Error, text);
     }
 
     /// What has to be seen stays in the status line until a key or button is pressed; an answer to a question is
@@ -499,15 +437,15 @@ impl App {
             matches!(event, Event::Key { pressed: true, .. } | Event::PointerButton { pressed: true, .. })
         };
         if self.question.is_none() && ctx.input(|input| input.events.iter().any(is_press)) {
-            self.messages.release();
+            self.pages.log.release();
         }
     }
 
     /// Returns whether `action` must wait because the motors may have torque, after showing that.
     fn is_refused_while_hot(&mut self, action: &str) -> bool {
-        let is_hot = self.link.is_hot();
+        let is_hot = self.state.link.is_hot();
         if is_hot {
-            let remedy = match self.link.awaits_motors_off() {
+            let remedy = match self.state.link.awaits_motors_off() {
                 true => {
                     "The motors have not confirmed that they are off. Switch off their supply and disconnect"
                 }
@@ -520,8 +458,8 @@ impl App {
 
     /// The running robot gets new gains; the first gains of a model start it.
     fn follow_design(&mut self) {
-        let started = self.designer.in_force.is_some();
-        if self.designer.update(&self.session) {
+        let started = self.state.designer.in_force.is_some();
+        if self.state.designer.update(&self.state.session) {
             if started {
                 self.send_controller();
             } else {
@@ -531,9 +469,9 @@ impl App {
     }
 
     fn reset_live(&mut self) {
-        self.history.clear();
-        self.tune.reset_view();
-        self.live.send(match self.robot_and_controller() {
+        self.state.history.clear();
+        self.pages.tune.reset_view();
+        self.state.live.send(match self.robot_and_controller() {
             Some((robot, controller)) => LiveCommand::Reset(Box::new(robot), controller),
             // The robot of before must not run on under another model's name.
             None => LiveCommand::Clear,
@@ -542,29 +480,29 @@ impl App {
 
     fn send_robot(&mut self) {
         if let Some((robot, controller)) = self.robot_and_controller() {
-            self.link.set_design(controller.clone());
-            self.live.send(LiveCommand::Robot(Box::new(robot), controller));
+            self.state.link.set_design(controller.clone());
+            self.state.live.send(LiveCommand::Robot(Box::new(robot), controller));
         }
     }
 
     fn send_controller(&mut self) {
         if let Some((_, controller)) = self.robot_and_controller() {
-            self.link.set_design(controller.clone());
-            self.live.send(LiveCommand::Controller(controller));
+            self.state.link.set_design(controller.clone());
+            self.state.live.send(LiveCommand::Controller(controller));
         }
     }
 
     fn robot_and_controller(
         &self,
     ) -> Option<(flqr_core::model::RobotModel, flqr_core::control::BalanceController)> {
-        let gain = self.designer.in_force?.design.gain;
-        Some((self.session.robot()?.clone(), self.session.balance_controller(gain)?))
+        let gain = self.state.designer.in_force?.design.gain;
+        Some((self.state.session.robot()?.clone(), self.state.session.balance_controller(gain)?))
     }
 
     fn write_state(&mut self, ctx: &Context) {
         let Some(out) = &mut self.state_out else { return };
         if let Some(problem) = out.problem() {
-            self.messages.add(Severity::Error, problem);
+            self.pages.log.add(Severity::Error, problem);
         }
         if let Some(wait) = out.wait() {
             ctx.request_repaint_after(wait);
@@ -579,19 +517,20 @@ impl App {
 
     /// State of the window for `--state-out`.
     pub fn snapshot(&self) -> serde_json::Value {
-        let weights = self.session.weights();
-        let design = self.designer.in_force.map(|designed| designed.design);
-        let controller = match self.session.controller {
+        let weights = self.state.session.weights();
+        let design = self.state.designer.in_force.map(|designed| designed.design);
+        let controller = match self.state.session.controller {
             ControllerKind::Lqr => "lqr",
             ControllerKind::Flqr => "flqr",
         };
         let gain = design.map(|d| [0, 1].map(|row| [0, 1, 2, 3].map(|column| d.gain[(row, column)])));
         let poles = design.map(|d| d.poles.map(|pole| [pole.re, pole.im]));
-        let friction = [0, 1].map(|motor| self.session.friction(motor).map(|curve| *curve.parameters()));
-        serde_json::json!({
+        let friction =
+            [0, 1].map(|motor| self.state.session.friction(motor).map(|curve| *curve.parameters()));
+        let mut state = serde_json::json!({
             "about": ABOUT,
-            "model": self.session.name,
-            "unsaved_changes": self.session != self.saved,
+            "model": self.state.session.name,
+            "unsaved_changes": self.state.session != self.state.saved,
             "tab": self.tab.key(),
             "shown": self.layout.shown().iter().map(|tab| tab.key()).collect::<Vec<_>>(),
             "questions_waiting": self.waiting.len(),
@@ -603,30 +542,29 @@ impl App {
             "manual": self.help.as_ref().map(Help::snapshot),
             "leaving": self.leaving,
             "layout": self.layout.node().to_value(),
-            "source": self.source.key(),
+            "source": self.state.source.key(),
             "controller": controller,
             "q_diagonal": weights.q.diagonal().as_slice(),
             "r_diagonal": weights.r.diagonal().as_slice(),
             "gain": gain,
             "poles": poles,
-            "design_problem": self.designer.problem,
+            "design_problem": self.state.designer.problem,
             "friction": friction,
             "simulation": {
-                "paused": self.live.status.paused,
-                "fell": self.live.status.fell,
-                "seconds": self.history.end_s().floor(),
-                "lost_samples": self.live.status.lost_samples,
-                "displacement_mm": self.history.last(Channel::Displacement).map(|x_m| (1e3 * x_m).round()),
+                "paused": self.state.live.status.paused,
+                "fell": self.state.live.status.fell,
+                "seconds": self.state.history.end_s().floor(),
+                "lost_samples": self.state.live.status.lost_samples,
+                "displacement_mm": self.state.history.last(Channel::Displacement).map(|x_m| (1e3 * x_m).round()),
             },
-            "tune_tab": self.tune.snapshot(&self.designer),
-            "friction_tab": self.friction.snapshot(),
-            "refine_tab": self.refine.snapshot(&self.session),
-            "experiments_tab": self.experiments.snapshot(),
-            "runs_tab": self.runs.snapshot(),
-            "robot_tab": self.robot.snapshot(&self.link),
-            "message": self.messages.status().map(|(_, text)| text),
-            "message_severity": self.messages.status().map(|(severity, _)| severity.word()),
-        })
+            "message": self.pages.log.status().map(|(_, text)| text),
+            "message_severity": self.pages.log.status().map(|(severity, _)| severity.word()),
+        });
+        let context = self.state.context();
+        for (tab, page) in Tab::ALL.into_iter().zip(self.pages.all()) {
+            state[format!("{}_tab", tab.key())] = page.snapshot(&context);
+        }
+        state
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::cell::RefCell;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use flqr_core::control::ControllerKind;
 use flqr_core::device::{SessionOrder, Source as DeviceSource};
@@ -10,10 +11,9 @@ use flqr_core::model::{Effect, RobotParameters, Weights};
 
 use crate::experiments::SavedAs;
 use crate::layout::Side;
+use crate::pages::{PageCommand, Tab};
 use crate::plot::FigureFile;
-use crate::refine::{RefineCommand, RefineFile};
-use crate::runs::RunsCommand;
-use crate::tab::Tab;
+use crate::refine::RefineFile;
 
 /// Source of measured values.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -168,8 +168,8 @@ pub(crate) enum Command {
         path: PathBuf,
         replace: bool,
     },
-    /// Of the page that finds what the model lacks.
-    Refine(RefineCommand),
+    /// Command of a page.
+    Page(Arc<dyn PageCommand>),
     /// Looks for CAN interfaces and serial ports.
     RefreshInterfaces,
     /// Opens the session that the form of the robot page describes.
@@ -191,21 +191,25 @@ pub(crate) enum Command {
     ChooseRecording(PathBuf),
     /// Path of a figure, or the reason why there is none.
     ChooseFigure(FigureFile, Result<PathBuf, String>),
-    /// Changes the ledger of runs.
-    Runs(RunsCommand),
     /// One sentence for the status line.
     Say(String),
     /// Adds an error message.
     Complain(String),
 }
 
-/// The wishes of this pass.
+impl<C: PageCommand + 'static> From<C> for Command {
+    fn from(command: C) -> Self {
+        Self::Page(Arc::new(command))
+    }
+}
+
+/// Commands of this pass.
 #[derive(Default)]
 pub(crate) struct Commands(RefCell<Vec<Command>>);
 
 impl Commands {
-    pub(crate) fn send(&self, command: Command) {
-        self.0.borrow_mut().push(command);
+    pub(crate) fn send(&self, command: impl Into<Command>) {
+        self.0.borrow_mut().push(command.into());
     }
 
     pub(crate) fn take(&self) -> Vec<Command> {

@@ -10,7 +10,10 @@ use egui::{
 };
 
 use flqr_core::message;
+use serde_json::Value;
 
+use crate::context::ViewContext;
+use crate::pages::Page;
 use crate::theme::palette;
 use crate::widgets::hint_ui;
 
@@ -47,6 +50,14 @@ impl Severity {
 
 /// Message and severity.
 pub(crate) type Said = (Severity, String);
+
+/// Turns the outcome of some work into a message.
+pub(crate) fn said(outcome: Result<String, String>) -> Said {
+    match outcome {
+        Ok(text) => (Severity::Note, text),
+        Err(problem) => (Severity::Error, problem),
+    }
+}
 
 /// One message, and how often it came in a row.
 #[derive(Clone, Debug, PartialEq)]
@@ -154,16 +165,6 @@ impl Messages {
         self.all.iter().filter(fits).collect()
     }
 
-    /// The page.
-    pub(crate) fn ui(&mut self, ui: &mut Ui) {
-        let frame = Frame::central_panel(ui.style()).inner_margin(Margin::symmetric(10, 6));
-        CentralPanel::default().frame(frame).show(ui, |ui| {
-            self.controls_ui(ui);
-            ui.separator();
-            self.rows_ui(ui);
-        });
-    }
-
     fn controls_ui(&mut self, ui: &mut Ui) {
         ui.horizontal_wrapped(|ui| {
             let filter = TextEdit::singleline(&mut self.filter).hint_text("filter").desired_width(180.0);
@@ -216,6 +217,25 @@ impl Messages {
                 ui.scope_builder(place, |ui| row_ui(shown[index], ui));
             }
         });
+    }
+}
+
+impl Page for Messages {
+    fn ui(&mut self, _: &ViewContext<'_>, ui: &mut Ui) {
+        let frame = Frame::central_panel(ui.style()).inner_margin(Margin::symmetric(10, 6));
+        CentralPanel::default().frame(frame).show(ui, |ui| {
+            self.controls_ui(ui);
+            ui.separator();
+            self.rows_ui(ui);
+        });
+    }
+
+    fn snapshot(&self, _: &ViewContext<'_>) -> Value {
+        Value::Null
+    }
+
+    fn command_line(&self, _: &ViewContext<'_>) -> Result<String, String> {
+        Err("There is no command for this page.".to_owned())
     }
 }
 

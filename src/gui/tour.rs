@@ -3,7 +3,7 @@
 use egui::{Align2, Context, RichText, Window, vec2};
 
 use crate::command::{Command, Commands};
-use crate::tab::Tab;
+use crate::pages::Tab;
 
 /// Title, what to do, and the page it is on.
 const STEPS: [(&str, &str, Tab); 5] = [

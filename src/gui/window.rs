@@ -11,8 +11,8 @@ use flqr_core::record::Mapping;
 
 use crate::app::App;
 use crate::memory::keep_freed_memory;
+use crate::pages::Tab;
 use crate::robot::{Devices, System};
-use crate::tab::Tab;
 
 /// Start options of the window.
 #[derive(Clone, Debug)]

@@ -12,7 +12,6 @@ use super::persistence::{self, absolute};
 use super::questions::{Question, Replacement};
 use super::{App, ModelJob};
 use crate::command::{Command, FilePurpose, Source, Target};
-use crate::command_line;
 use crate::commands::Palette;
 use crate::dialog::{Dialog, missing_portal};
 use crate::document::Base;
@@ -22,10 +21,9 @@ use crate::job::{Job, Outcome, Reporter};
 use crate::layout::Layout;
 use crate::live::LiveCommand;
 use crate::messages::Severity;
-use crate::refine::{RESIDUAL_STACK, RefineCommand, RefineFile, Surroundings};
-use crate::runs::RunsCommand;
+use crate::pages::{Done, Page, PageCommand, Surroundings, Tab};
+use crate::refine::{RESIDUAL_STACK, RefineCommand, RefineFile};
 use crate::session::Session;
-use crate::tab::Tab;
 use crate::tour::Tour;
 use crate::write_file::{Saved, save_file};
 
@@ -55,11 +53,9 @@ pub(super) fn chosen(purpose: FilePurpose, path: PathBuf) -> Command {
             Command::SaveSession { path, replace }
         }
         // The dialog knows one name as it was typed; what is written may have another or several.
-        FilePurpose::Refine(RefineFile::Log) => {
-            Command::Refine(RefineCommand::Load { path, held_out: false })
-        }
+        FilePurpose::Refine(RefineFile::Log) => RefineCommand::Load { path, held_out: false }.into(),
         FilePurpose::Refine(RefineFile::Save(saved_as)) => {
-            Command::Refine(RefineCommand::Save { saved_as, path, replace: false })
+            RefineCommand::Save { saved_as, path, replace: false }.into()
         }
         FilePurpose::SaveExperiment(saved_as) => Command::SaveExperiment { saved_as, path, replace: false },
     }
@@ -85,8 +81,8 @@ impl App {
             Command::SetZoom(zoom) => ctx.set_zoom_factor(zoom.clamp(ZOOMS[0], ZOOMS[1])),
             Command::ShowPalette => self.palette = Some(Palette::default()),
             Command::FocusWeights => {
-                self.commands.send(Command::SelectTab(Tab::Tune));
-                self.tune.focus_weights();
+                self.state.commands.send(Command::SelectTab(Tab::Tune));
+                self.pages.tune.focus_weights();
             }
             Command::FocusPath => self.focus_path(),
             Command::Undo => self.go(false),
@@ -94,71 +90,74 @@ impl App {
             Command::ShowSteps => self.ask(Question::Steps),
             Command::StartTour => {
                 self.tour = Some(Tour::default());
-                self.commands.send(Command::SelectTab(Tab::Tune));
+                self.state.commands.send(Command::SelectTab(Tab::Tune));
             }
             Command::ShowManual => match &mut self.help {
                 Some(help) => help.show(self.tab),
                 None => self.help = Some(Help::open(self.tab)),
             },
-            Command::CopyLine => self.copy_line(self.command_line(), ctx),
-            Command::CopyLineOf(run) => self.copy_line(self.runs.command_of(run), ctx),
+            Command::CopyLine => {
+                let line = self.pages.all()[self.tab as usize].command_line(&self.state.context());
+                self.copy_line(line, ctx);
+            }
+            Command::CopyLineOf(run) => self.copy_line(self.pages.runs.command_of(run), ctx),
             Command::AskFile(purpose) => self.ask_file(purpose),
             Command::OpenSession(path) => self.open_session(absolute(path)),
             Command::SaveSession { path, replace } => self.save_session(absolute(path), replace, ctx),
             Command::Quit => ctx.send_viewport_cmd(egui::ViewportCommand::Close),
-            Command::Stop => self.link.stop(),
+            Command::Stop => self.state.link.stop(),
             Command::SelectSource(source) => self.select_source(source),
             Command::SetWeights(weights) => {
-                if let Some(robot) = self.session.robot_mut() {
+                if let Some(robot) = self.state.session.robot_mut() {
                     robot.weights = Some(weights);
                 }
             }
-            Command::KeepReference => self.designer.keep(),
+            Command::KeepReference => self.state.designer.keep(),
             Command::SwapReference => self.swap_reference(),
             Command::RestoreReference => self.restore_reference(),
             Command::ResetWeights => self.reset_weights(),
             Command::SetParameters(parameters) => {
-                if let Some(robot) = self.session.robot_mut() {
+                if let Some(robot) = self.state.session.robot_mut() {
                     robot.set_parameters(parameters);
                 }
-                self.designer.update(&self.session);
+                self.state.designer.update(&self.state.session);
                 self.send_robot();
             }
             Command::SetFriction(friction) => {
-                if let Some(robot) = self.session.robot_mut() {
+                if let Some(robot) = self.state.session.robot_mut() {
                     robot.friction = friction;
                 }
                 self.send_robot();
             }
             Command::SetTorqueLimit(limit) => {
-                if let Some(robot) = self.session.robot_mut() {
+                if let Some(robot) = self.state.session.robot_mut() {
                     robot.limits.torque_nm = limit;
                 }
                 self.send_robot();
             }
             Command::SetCompensation(compensation) => {
-                if let Some(robot) = self.session.robot_mut() {
+                if let Some(robot) = self.state.session.robot_mut() {
                     robot.compensation = Some(compensation);
                 }
                 self.send_controller();
             }
             Command::SetEffects(effects) => {
                 self.undo.call("effects");
-                match &mut self.session.rig {
+                match &mut self.state.session.rig {
                     Rig::Robot(robot) => robot.effects = effects,
                     Rig::Axis(axis) => axis.effects = effects,
                 }
-                self.designer.update(&self.session);
+                self.state.designer.update(&self.state.session);
                 self.send_robot();
             }
             Command::SetController(kind) => {
-                self.session.controller = kind;
+                self.state.session.controller = kind;
                 self.send_controller();
             }
-            Command::SetPaused(paused) => self.live.send(LiveCommand::Pause(paused)),
+            Command::SetPaused(paused) => self.state.live.send(LiveCommand::Pause(paused)),
             Command::ResetSimulation => self.reset_live(),
             Command::Push { force_n, duration_s } => {
-                self.live.send(LiveCommand::Push { force_n, duration_s });
+                self.state.live.send(LiveCommand::Push { force_n, duration_s });
             }
             Command::SetFrameInterval(interval) => {
                 self.frame_interval = interval;
@@ -169,55 +168,47 @@ impl App {
             Command::TakePreset(number) => self.load_preset(number),
             // A log that is opened as a model is loaded as a log.
             Command::LoadModel(path) if path.extension().is_some_and(|ending| ending == "csv") => {
-                self.commands.send(Command::LoadLog(path));
-                self.commands.send(Command::SelectTab(Tab::Friction));
+                self.state.commands.send(Command::LoadLog(path));
+                self.state.commands.send(Command::SelectTab(Tab::Friction));
             }
             Command::LoadModel(path) => self.load_model(absolute(path)),
             Command::SaveModel(path) => self.save_model(absolute(path), false),
             Command::OverwriteModel(path) => self.save_model(absolute(path), true),
             Command::LoadLog(path) => self.load_log(&absolute(path)),
-            Command::CancelLoad => self.friction.cancel_load(),
+            Command::CancelLoad => self.pages.friction.cancel_load(),
             Command::StartFit => self.start_fit(),
-            Command::CancelFit => self.friction.cancel_fit(),
+            Command::CancelFit => self.pages.friction.cancel_fit(),
             Command::UseFit(target) => self.use_fit(target),
             Command::StartExperiment => self.start_experiment(),
-            Command::CancelExperiment => self.experiments.cancel(),
+            Command::CancelExperiment => self.pages.experiments.cancel(),
             Command::SaveExperiment { saved_as, path, replace } => {
-                if let Err(problem) = self.experiments.save(saved_as, path, replace, ctx, &self.waker) {
+                if let Err(problem) = self.pages.experiments.save(saved_as, path, replace, ctx, &self.waker) {
                     self.fail(problem);
                 }
             }
-            Command::Refine(command) => self.apply_refine(command),
-            Command::RefreshInterfaces => self.robot.look(&self.link, &self.waker),
+            Command::Page(command) => self.apply_to_page(&*command),
+            Command::RefreshInterfaces => self.pages.robot.look(&self.state.link, &self.waker),
             Command::Connect => self.connect(),
             Command::Disconnect => self.disconnect(),
             Command::ApplyGains => self.apply_gains(),
             Command::ConfirmGains => self.confirm_gains(),
             Command::FollowGains(follow) => {
-                self.link.transfer.follow = follow;
+                self.state.link.transfer.follow = follow;
                 self.send_controller();
             }
             Command::StopAndQuit => {
-                self.link.stop();
-                self.link.close(&self.waker);
+                self.state.link.stop();
+                self.state.link.close(&self.waker);
                 ctx.send_viewport_cmd(egui::ViewportCommand::Close);
             }
-            Command::Order(order) => self.link.send(order),
-            Command::ChooseReplay(path) => self.robot.form.replay = path.display().to_string(),
-            Command::ChooseRecording(path) => self.robot.note_recording_path(&path),
+            Command::Order(order) => self.state.link.send(order),
+            Command::ChooseReplay(path) => self.pages.robot.form.replay = path.display().to_string(),
+            Command::ChooseRecording(path) => self.pages.robot.note_recording_path(&path),
             Command::ChooseFigure(file, answer) => {
                 if file.stack == RESIDUAL_STACK {
-                    self.refine.show_residual();
+                    self.pages.refine.show_residual();
                 }
                 file.answer(ctx, answer);
-            }
-            Command::Runs(command) => {
-                if matches!(command, RunsCommand::OverlayLast | RunsCommand::FocusRows) {
-                    self.commands.send(Command::SelectTab(Tab::Runs));
-                }
-                if let Some(text) = self.runs.apply(command, &self.waker) {
-                    self.say(text);
-                }
             }
             Command::Say(text) => self.say(text),
             Command::Complain(text) => self.fail(text),
@@ -226,74 +217,72 @@ impl App {
     }
 
     fn focus_path(&mut self) {
-        match self.tab {
-            Tab::Experiments => self.experiments.focus_path(),
-            Tab::Refine => self.refine.focus_path(),
-            Tab::Tune | Tab::Friction | Tab::Robot | Tab::Runs | Tab::Log => {
-                self.commands.send(Command::SelectTab(Tab::Friction));
-                self.friction.focus_path();
-            }
+        if !self.pages.all_mut()[self.tab as usize].focus_path() {
+            self.state.commands.send(Command::SelectTab(Tab::Friction));
+            self.pages.friction.focus_path();
         }
     }
 
     pub(super) fn set_live_interval(&mut self) {
         let interval = |shown: bool| if shown { self.frame_interval } else { HIDDEN_INTERVAL };
-        let simulated = self.source == Source::Simulated;
+        let simulated = self.state.source == Source::Simulated;
         let live = interval(self.layout.shows(Tab::Tune) && simulated);
         let robot = self.layout.shows(Tab::Tune) || self.layout.shows(Tab::Robot);
         let link = interval(robot && !simulated);
-        self.live.send(LiveCommand::Interval(live));
-        self.link.set_interval(link);
+        self.state.live.send(LiveCommand::Interval(live));
+        self.state.link.set_interval(link);
     }
 
     /// What is plugged in changes: looked up whenever the list comes into view.
     fn look_for_interfaces(&mut self) {
-        let wired = matches!(self.source, Source::Can | Source::Slcan);
-        if self.tab == Tab::Robot && wired && !self.link.is_open() {
-            self.robot.look(&self.link, &self.waker);
+        let wired = matches!(self.state.source, Source::Can | Source::Slcan);
+        if self.tab == Tab::Robot && wired && !self.state.link.is_open() {
+            self.pages.robot.look(&self.state.link, &self.waker);
         }
     }
 
     fn connect(&mut self) {
-        if self.link.is_open() || self.link.is_opening() {
+        if self.state.link.is_open() || self.state.link.is_opening() {
             return self.fail("A robot is already connected. Disconnect it first.");
         }
-        let options = match self.robot.form.options(self.source, &self.session, &self.designer) {
-            Ok(options) => options,
-            Err(problem) => return self.fail(problem),
-        };
+        let options =
+            match self.pages.robot.form.options(self.state.source, &self.state.session, &self.state.designer)
+            {
+                Ok(options) => options,
+                Err(problem) => return self.fail(problem),
+            };
         self.note_connection(&options);
-        self.robot.begin(&options);
-        self.tune.reset_view();
+        self.pages.robot.begin(&options);
+        self.pages.tune.reset_view();
         self.say(format!("Connecting to {}…", options.source));
-        self.link.open(options, &self.waker);
+        self.state.link.open(options, &self.waker);
         self.set_live_interval();
     }
 
     /// Remembers the connection for the next start of the program.
     fn note_connection(&mut self, options: &SessionOptions) {
         match &options.source {
-            DeviceSource::Can { interface } => self.recent.can_interface.clone_from(interface),
+            DeviceSource::Can { interface } => self.state.recent.can_interface.clone_from(interface),
             DeviceSource::Slcan { port, bit_rate } => {
-                self.recent.slcan = [port.clone(), bit_rate.to_string()];
+                self.state.recent.slcan = [port.clone(), bit_rate.to_string()];
             }
-            DeviceSource::Replay { file } => self.recent.note_recording(file),
+            DeviceSource::Replay { file } => self.state.recent.note_recording(file),
             DeviceSource::Emulated => {}
         }
         if let Some(imu) = &options.imu {
-            self.recent.imu = [imu.port.clone(), imu.baud.to_string()];
+            self.state.recent.imu = [imu.port.clone(), imu.baud.to_string()];
         }
         self.save_recent();
     }
 
     fn disconnect(&mut self) {
-        self.link.close(&self.waker);
+        self.state.link.close(&self.waker);
         self.say("Disconnected.");
         self.look_for_interfaces();
     }
 
     fn apply_gains(&mut self) {
-        let verdict = self.link.transfer.pending().map(|pending| pending.verdict.clone());
+        let verdict = self.state.link.transfer.pending().map(|pending| pending.verdict.clone());
         match verdict {
             None => self.say("The robot already uses the gains of the design."),
             Some(Verdict::Accept) => self.confirm_gains(),
@@ -305,30 +294,30 @@ impl App {
     }
 
     fn confirm_gains(&mut self) {
-        if self.link.apply_design() {
+        if self.state.link.apply_design() {
             self.say("New gains applied, blended over 0.2 s.");
         }
     }
 
     fn select_source(&mut self, source: Source) {
-        if source == self.source {
+        if source == self.state.source {
             return;
         }
         if self.is_refused_while_hot("change the source") {
             return;
         }
-        self.link.close(&self.waker);
-        self.link.forget();
-        self.robot.leave_source();
-        self.tune.reset_view();
-        if self.source == Source::Simulated {
-            self.paused_before = self.live.status.paused;
-            self.live.send(LiveCommand::Pause(true));
+        self.state.link.close(&self.waker);
+        self.state.link.forget();
+        self.pages.robot.leave_source();
+        self.pages.tune.reset_view();
+        if self.state.source == Source::Simulated {
+            self.paused_before = self.state.live.status.paused;
+            self.state.live.send(LiveCommand::Pause(true));
         }
-        self.source = source;
+        self.state.source = source;
         self.set_live_interval();
         if source == Source::Simulated {
-            self.live.send(LiveCommand::Pause(self.paused_before));
+            self.state.live.send(LiveCommand::Pause(self.paused_before));
             self.say("The plots show the simulated robot.");
         } else {
             self.say("The simulated robot is paused. Nothing is connected yet: see the Robot tab.");
@@ -337,24 +326,24 @@ impl App {
     }
 
     fn restore_reference(&mut self) {
-        let Some(reference) = self.designer.reference else { return };
-        if let Some(robot) = self.session.robot_mut() {
+        let Some(reference) = self.state.designer.reference else { return };
+        if let Some(robot) = self.state.session.robot_mut() {
             robot.weights = Some(reference.weights);
         }
-        self.say(format!("The weights of {} are active.", self.designer.active.other().name()));
+        self.say(format!("The weights of {} are active.", self.state.designer.active.other().name()));
     }
 
     fn swap_reference(&mut self) {
-        let Some(weights) = self.designer.swap() else { return };
-        if let Some(robot) = self.session.robot_mut() {
+        let Some(weights) = self.state.designer.swap() else { return };
+        if let Some(robot) = self.state.session.robot_mut() {
             robot.weights = Some(weights);
         }
-        self.say(format!("{} is active.", self.designer.active.name()));
+        self.say(format!("{} is active.", self.state.designer.active.name()));
     }
 
     fn reset_weights(&mut self) {
-        let weights = self.saved.robot().and_then(|robot| robot.weights);
-        if let Some(robot) = self.session.robot_mut() {
+        let weights = self.state.saved.robot().and_then(|robot| robot.weights);
+        if let Some(robot) = self.state.session.robot_mut() {
             robot.weights = weights;
         }
         self.say("The weights were reset to the loaded model.");
@@ -367,22 +356,6 @@ impl App {
                 ctx.copy_text(line);
             }
             Err(problem) => self.fail(problem),
-        }
-    }
-
-    /// The command that does in a terminal what the page shows.
-    fn command_line(&self) -> Result<String, String> {
-        let model = self.model_path_of_session();
-        match self.tab {
-            Tab::Tune | Tab::Log => Ok(command_line::gains(model)),
-            Tab::Runs => self.runs.command_line(),
-            Tab::Friction => self.friction.command_line(model),
-            Tab::Refine => self.refine.command_line(&self.session, model),
-            Tab::Experiments => Ok(self.experiments.command_line(model)),
-            Tab::Robot => {
-                let controller = self.session.controller;
-                self.robot.form.command_line(self.source, (&self.session, &self.designer), controller, model)
-            }
         }
     }
 
@@ -402,15 +375,13 @@ impl App {
             self.say("A file dialog is already open.");
             return;
         }
-        let name = self.model_path.as_deref().and_then(Path::file_name);
-        let suggestion = match purpose {
-            FilePurpose::SaveExperiment(saved_as) => self.experiments.suggested_name(saved_as),
-            FilePurpose::Refine(RefineFile::Save(saved_as)) => self.refine.suggested_name(saved_as),
-            FilePurpose::SaveRecording => self.robot.suggested_name(),
+        let name = self.state.model_path.as_deref().and_then(Path::file_name);
+        let of_page = self.pages.all().into_iter().find_map(|page| page.suggested_name(purpose));
+        let suggestion = of_page.unwrap_or_else(|| match purpose {
             FilePurpose::SaveFigure(file) => file.suggestion(),
             FilePurpose::SaveSession => format!("session.{}", crate::document::EXTENSION),
             _ => name.map_or_else(|| "model.toml".to_owned(), |name| name.to_string_lossy().into_owned()),
-        };
+        });
         match Dialog::open(purpose, suggestion, &self.waker) {
             Ok(dialog) => self.dialog = Some(dialog),
             Err(error) => self.fail(format!("Cannot open a file dialog: {error}.")),
@@ -434,15 +405,15 @@ impl App {
             return false;
         }
         // A robot is driven by the model that it was connected with, or not at all.
-        self.link.close(&self.waker);
-        let session = Session::new(model, self.session.controller);
-        self.saved = session.clone();
-        self.model_path = path;
+        self.state.link.close(&self.waker);
+        let session = Session::new(model, self.state.session.controller);
+        self.state.saved = session.clone();
+        self.state.model_path = path;
         self.undo.call(format!("load “{}”", session.name));
-        self.base = self.undo.add_base(Base { saved: session.clone(), path: self.model_path.clone() });
+        self.base = self.undo.add_base(Base { saved: session.clone(), path: self.state.model_path.clone() });
         self.show_model(session);
-        if let Some(path) = self.model_path.clone() {
-            self.recent.note_model(&path);
+        if let Some(path) = self.state.model_path.clone() {
+            self.state.recent.note_model(&path);
             self.save_recent();
         }
         self.say_loaded();
@@ -450,10 +421,10 @@ impl App {
     }
 
     pub(super) fn say_loaded(&mut self) {
-        let filled_in = self.session.filled_in().map(|text| format!(" {text}")).unwrap_or_default();
-        self.say(format!("“{}” is loaded.{filled_in}", self.session.name));
-        for warning in self.session.model().warnings() {
-            self.messages.add(Severity::Warning, warning.to_string());
+        let filled_in = self.state.session.filled_in().map(|text| format!(" {text}")).unwrap_or_default();
+        self.say(format!("“{}” is loaded.{filled_in}", self.state.session.name));
+        for warning in self.state.session.model().warnings() {
+            self.pages.log.add(Severity::Warning, warning.to_string());
         }
     }
 
@@ -484,8 +455,8 @@ impl App {
             return;
         }
         let path = if path.extension().is_none() { path.with_extension("toml") } else { path };
-        let replace = replace || self.model_path.as_ref() == Some(&path);
-        let (file, model) = (path.clone(), self.session.model());
+        let replace = replace || self.state.model_path.as_ref() == Some(&path);
+        let (file, model) = (path.clone(), self.state.session.model());
         let write = move |_: &Reporter<()>| {
             // Comments and order of the file that is replaced stay.
             let text = || match std::fs::read_to_string(&file) {
@@ -495,7 +466,7 @@ impl App {
             save_file(&file, text, replace)
         };
         match Job::start("save-model", &self.waker, write) {
-            Ok(job) => self.model_job = Some(ModelJob::Save(path, self.session.clone(), job)),
+            Ok(job) => self.model_job = Some(ModelJob::Save(path, self.state.session.clone(), job)),
             Err(error) => {
                 self.leave_after_save = false;
                 self.fail(format!("Cannot start saving the model: {error}."));
@@ -509,17 +480,20 @@ impl App {
             Some(ModelJob::Load(path, mut job)) => match job.poll().1 {
                 Outcome::Running => self.model_job = Some(ModelJob::Load(path, job)),
                 Outcome::Done(Ok((model, renamed))) => {
-                    if self.session != self.saved && model != self.session.model() && !self.link.is_hot() {
+                    if self.state.session != self.state.saved
+                        && model != self.state.session.model()
+                        && !self.state.link.is_hot()
+                    {
                         self.ask_replacement(Replacement::Model(Box::new(model), path));
                     } else {
                         self.open_model(model, Some(path));
                     }
                     for key in renamed {
-                        self.messages.add(Severity::Note, key.to_string());
+                        self.pages.log.add(Severity::Note, key.to_string());
                     }
                 }
                 Outcome::Done(Err(problem)) => {
-                    self.tune.note_file_problem(&problem);
+                    self.pages.tune.note_file_problem(&problem);
                     self.fail(problem);
                 }
                 Outcome::Broken => self.fail("Loading the model failed: this is an internal error."),
@@ -535,7 +509,7 @@ impl App {
                 }
                 Outcome::Done(Err(problem)) => {
                     self.leave_after_save = false;
-                    self.tune.note_file_problem(&problem);
+                    self.pages.tune.note_file_problem(&problem);
                     self.fail(problem);
                 }
                 Outcome::Broken => {
@@ -548,15 +522,15 @@ impl App {
 
     pub(super) fn note_saved(&mut self, path: PathBuf, session: Session) {
         self.say(format!("Saved to {}.", path.display()));
-        self.saved = session;
-        self.recent.note_model(&path);
-        self.tune.note_saved(&path);
-        self.undo.set_base(self.base, Base { saved: self.saved.clone(), path: Some(path.clone()) });
-        self.model_path = Some(path);
+        self.state.saved = session;
+        self.state.recent.note_model(&path);
+        self.pages.tune.note_saved(&path);
+        self.undo.set_base(self.base, Base { saved: self.state.saved.clone(), path: Some(path.clone()) });
+        self.state.model_path = Some(path);
         self.save_recent();
         if std::mem::take(&mut self.leave_after_save) {
             // What was edited while the file was written is in no file.
-            match self.session == self.saved {
+            match self.state.session == self.state.saved {
                 true => self.leaving = true,
                 false => self.ask(Question::Leave),
             }
@@ -564,9 +538,9 @@ impl App {
     }
 
     fn load_log(&mut self, path: &Path) {
-        match self.friction.load(path, &self.waker) {
+        match self.pages.friction.load(path, &self.waker) {
             Ok(()) => {
-                self.recent.note_log(path);
+                self.state.recent.note_log(path);
                 self.save_recent();
             }
             Err(problem) => self.fail(problem),
@@ -574,59 +548,60 @@ impl App {
     }
 
     fn start_fit(&mut self) {
-        let path = self.model_path_of_session().map(Path::to_owned);
-        if let Err(problem) = self.friction.start_fit(self.session.model(), path.as_deref(), &self.waker) {
+        let path = self.state.model_path_of_session().map(Path::to_owned);
+        if let Err(problem) =
+            self.pages.friction.start_fit(self.state.session.model(), path.as_deref(), &self.waker)
+        {
             self.fail(problem);
         }
     }
 
     fn use_fit(&mut self, target: Target) {
         self.undo.call("use fit in model");
-        let put = |fitted: Fitted| fitted.put_into(&mut self.session.rig, target);
-        match self.friction.fitted().and_then(put) {
+        let put = |fitted: Fitted| fitted.put_into(&mut self.state.session.rig, target);
+        match self.pages.friction.fitted().and_then(put) {
             Ok(done) => self.say(done),
             Err(problem) => return self.fail(problem),
         }
-        self.tune.refresh(&self.session);
+        self.pages.tune.refresh(&self.state.session);
         self.send_robot();
     }
 
-    fn apply_refine(&mut self, command: RefineCommand) {
-        let model_path = self.model_path_of_session().map(Path::to_owned);
-        let before = self.session.clone();
-        let around = Surroundings { session: &mut self.session, model_path, waker: &self.waker };
-        let done = match self.refine.apply(command, around) {
+    fn apply_to_page(&mut self, command: &dyn PageCommand) {
+        let model_path = self.state.model_path_of_session().map(Path::to_owned);
+        let before = self.state.session.clone();
+        let around = Surroundings { session: &mut self.state.session, model_path, waker: &self.waker };
+        let Done { said, step, tab, log } = match command.apply(&mut self.pages, around) {
             Ok(done) => done,
             Err(problem) => return self.fail(problem),
         };
-        if self.session != before {
-            self.undo.call("use effects in model");
-        }
-        if let Some(said) = done.said {
+        if let Some(said) = said {
             self.say(said);
         }
-        if let Some(log) = done.log {
-            self.recent.note_log(&log);
+        if let Some(log) = log {
+            self.state.recent.note_log(&log);
             self.save_recent();
         }
-        if let Some(scenario) = done.scenario {
-            self.experiments.choose(scenario);
-            self.commands.send(Command::SelectTab(Tab::Experiments));
+        if let Some(tab) = tab {
+            self.state.commands.send(Command::SelectTab(tab));
         }
-        if self.session != before {
-            self.tune.refresh(&self.session);
-            self.designer.update(&self.session);
+        if self.state.session != before {
+            self.undo.call(step);
+            self.pages.tune.refresh(&self.state.session);
+            self.state.designer.update(&self.state.session);
             self.send_robot();
         }
     }
 
     fn start_experiment(&mut self) {
         // The command line of a result names a file that holds the very same model.
-        let path = self
-            .model_path
-            .clone()
-            .filter(|_| self.session == self.saved && self.session.model_in_use() == self.session.model());
-        if let Err(problem) = self.experiments.start(self.session.model_in_use(), path, &self.waker) {
+        let path = self.state.model_path.clone().filter(|_| {
+            self.state.session == self.state.saved
+                && self.state.session.model_in_use() == self.state.session.model()
+        });
+        if let Err(problem) =
+            self.pages.experiments.start(self.state.session.model_in_use(), path, &self.waker)
+        {
             self.fail(problem);
         }
     }
@@ -641,18 +616,18 @@ impl App {
         if self.tab == Tab::Refine && files.iter().all(is_log) {
             for path in files {
                 let path = absolute(path);
-                self.commands.send(Command::Refine(RefineCommand::Load { path, held_out: false }));
+                self.state.commands.send(RefineCommand::Load { path, held_out: false });
             }
             return;
         }
         let Some(path) = files.into_iter().next() else { return };
         if ends_with(&path, crate::document::EXTENSION) {
-            self.commands.send(Command::OpenSession(path));
+            self.state.commands.send(Command::OpenSession(path));
         } else if ends_with(&path, "toml") {
-            self.commands.send(Command::LoadModel(path));
+            self.state.commands.send(Command::LoadModel(path));
         } else {
-            self.commands.send(Command::SelectTab(Tab::Friction));
-            self.commands.send(Command::LoadLog(path));
+            self.state.commands.send(Command::SelectTab(Tab::Friction));
+            self.state.commands.send(Command::LoadLog(path));
         }
     }
 }

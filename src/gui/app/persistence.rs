@@ -55,9 +55,9 @@ impl App {
         let layout = self.layout.node();
         let now = self.undo.now();
         let is_same = (now.base, now.ledger) == (self.base, self.ledger)
-            && now.session == self.session
-            && now.comparison == self.designer.comparison()
-            && now.experiment == *self.experiments.settings()
+            && now.session == self.state.session
+            && now.comparison == self.state.designer.comparison()
+            && now.experiment == *self.pages.experiments.settings()
             && now.layout.is_alike(&layout);
         let other = (!is_same).then(|| self.content());
         self.undo.watch(other, settled);
@@ -73,7 +73,7 @@ impl App {
             return;
         }
         let Some((name, content)) = self.undo.go(redo) else { return };
-        self.experiments.set_settings(content.experiment);
+        self.pages.experiments.set_settings(content.experiment);
         if !content.layout.is_alike(&self.layout.node()) {
             self.layout.set_node(&content.layout);
             self.layout.select(self.tab);
@@ -81,20 +81,20 @@ impl App {
         self.show_ledger(content.ledger);
         if content.base != self.base {
             self.take_base(content.base, content.session);
-        } else if content.session != self.session {
-            self.session = content.session;
-            self.tune.refresh(&self.session);
-            self.designer.update(&self.session);
+        } else if content.session != self.state.session {
+            self.state.session = content.session;
+            self.pages.tune.refresh(&self.state.session);
+            self.state.designer.update(&self.state.session);
             self.send_robot();
         }
-        self.designer.compare(content.comparison);
+        self.state.designer.compare(content.comparison);
         self.say(format!("{}: {name}.", if redo { "Redone" } else { "Undone" }));
     }
 
     /// Shows one of the ledgers that were opened.
     fn show_ledger(&mut self, number: usize) {
         if number != self.ledger {
-            let before = self.runs.take(std::mem::take(&mut self.ledgers[number]));
+            let before = self.pages.runs.take(std::mem::take(&mut self.ledgers[number]));
             self.ledgers[std::mem::replace(&mut self.ledger, number)] = before;
         }
     }
@@ -102,43 +102,43 @@ impl App {
     /// Goes to a model that was loaded before.
     fn take_base(&mut self, number: usize, session: Session) {
         let Some(Base { saved, path }) = self.undo.base(number).cloned() else { return };
-        self.link.close(&self.waker);
+        self.state.link.close(&self.waker);
         self.base = number;
-        self.saved = saved;
-        self.model_path = path;
+        self.state.saved = saved;
+        self.state.model_path = path;
         self.show_model(session);
     }
 
     /// Shows a session in place of the one before, from its start.
     pub(super) fn show_model(&mut self, session: Session) {
-        self.session = session;
-        self.tune.load(&self.session, self.model_path.as_deref());
-        self.designer = crate::design::Designer::default();
-        self.designer.update(&self.session);
+        self.state.session = session;
+        self.pages.tune.load(&self.state.session, self.state.model_path.as_deref());
+        self.state.designer = crate::design::Designer::default();
+        self.state.designer.update(&self.state.session);
         self.reset_live();
     }
 
     /// All that a session file keeps.
     fn document(&self, ctx: &Context) -> Document {
-        let changed = self.session != self.saved;
-        let column_map = self.friction.column_map();
+        let changed = self.state.session != self.state.saved;
+        let column_map = self.pages.friction.column_map();
         Document {
-            model: Some(self.session.model()),
-            saved_model: changed.then(|| self.saved.model()),
-            model_path: self.model_path.clone(),
-            controller: Some(self.session.controller),
-            experiment: Some(self.experiments.to_value()),
+            model: Some(self.state.session.model()),
+            saved_model: changed.then(|| self.state.saved.model()),
+            model_path: self.state.model_path.clone(),
+            controller: Some(self.state.session.controller),
+            experiment: Some(self.pages.experiments.to_value()),
             column_map: (!column_map.is_empty()).then_some(column_map),
-            log: self.friction.log_path().map(Path::to_owned),
-            refine_logs: Some(self.refine.log_files()).filter(|logs| !logs.is_empty()),
-            source: Some(self.source),
-            connection: Some(self.robot.form.to_value()),
+            log: self.pages.friction.log_path().map(Path::to_owned),
+            refine_logs: Some(self.pages.refine.log_files()).filter(|logs| !logs.is_empty()),
+            source: Some(self.state.source),
+            connection: Some(self.pages.robot.form.to_value()),
             layout: Some(self.layout.node()),
             tab: Some(self.tab),
             dark: Some(ctx.global_style().visuals.dark_mode),
             zoom: Some(ctx.zoom_factor()),
             degrees: Some(degrees(ctx)),
-            runs: Some(self.runs.ledger().clone()),
+            runs: Some(self.pages.runs.ledger().clone()),
         }
     }
 
@@ -153,19 +153,19 @@ impl App {
             ctx.set_theme(if dark { Theme::Dark } else { Theme::Light });
         }
         if let Some(zoom) = document.zoom {
-            self.commands.send(Command::SetZoom(zoom));
+            self.state.commands.send(Command::SetZoom(zoom));
         }
         if let Some(degrees) = document.degrees {
             set_degrees(ctx, degrees);
         }
         if let Some(map) = &document.column_map {
-            self.friction.suggest_column_map(map);
+            self.pages.friction.suggest_column_map(map);
         }
         if let Some(value) = &document.experiment {
-            problems.extend(self.experiments.take_value(value).err());
+            problems.extend(self.pages.experiments.take_value(value).err());
         }
         if let Some(value) = &document.connection {
-            problems.extend(self.robot.form.take_value(value).err());
+            problems.extend(self.pages.robot.form.take_value(value).err());
         }
         problems
     }
@@ -175,7 +175,7 @@ impl App {
     fn begin_as(&mut self, mut document: Document, ctx: &Context) {
         self.watch(true);
         if let Some(runs) = document.runs.take() {
-            let renamed = self.runs.begin_with(runs);
+            let renamed = self.pages.runs.begin_with(runs);
             if renamed > 0 {
                 self.say(format!(
                     "The previous runs were read late, so the last {renamed} rows of this window have new numbers."
@@ -195,11 +195,11 @@ impl App {
     /// State restored by undo.
     fn content(&self) -> Content {
         Content {
-            session: self.session.clone(),
+            session: self.state.session.clone(),
             base: self.base,
             ledger: self.ledger,
-            comparison: self.designer.comparison(),
-            experiment: self.experiments.settings().clone(),
+            comparison: self.state.designer.comparison(),
+            experiment: self.pages.experiments.settings().clone(),
             layout: self.layout.node(),
         }
     }
@@ -211,37 +211,40 @@ impl App {
         }
         self.undo.call(format!("open {name}"));
         if let Some(model) = document.model.clone() {
-            let controller = document.controller.unwrap_or(self.session.controller);
+            let controller = document.controller.unwrap_or(self.state.session.controller);
             let saved = document.saved_model.clone().unwrap_or_else(|| model.clone());
-            self.link.close(&self.waker);
-            self.saved = Session::new(saved, controller);
-            self.model_path.clone_from(&document.model_path);
-            self.base = self.undo.add_base(Base { saved: self.saved.clone(), path: self.model_path.clone() });
+            self.state.link.close(&self.waker);
+            self.state.saved = Session::new(saved, controller);
+            self.state.model_path.clone_from(&document.model_path);
+            self.base = self
+                .undo
+                .add_base(Base { saved: self.state.saved.clone(), path: self.state.model_path.clone() });
             self.show_model(Session::new(model, controller));
         }
         if let Some(source) = document.source {
-            self.commands.send(Command::SelectSource(source));
+            self.state.commands.send(Command::SelectSource(source));
         }
         if let Some(log) = document.log.clone() {
-            self.commands.send(Command::LoadLog(log));
+            self.state.commands.send(Command::LoadLog(log));
         }
         if let Some(runs) = &document.runs {
             self.ledgers.push(runs.clone());
             self.show_ledger(self.ledgers.len() - 1);
         }
-        self.commands.send(Command::Refine(RefineCommand::Clear));
+        self.state.commands.send(RefineCommand::Clear);
         for (path, held_out) in document.refine_logs.iter().flatten().cloned() {
-            self.commands.send(Command::Refine(RefineCommand::Load { path, held_out }));
+            self.state.commands.send(RefineCommand::Load { path, held_out });
         }
         let unused = self.take_surroundings(document, ctx);
         if !unused.is_empty() {
-            self.messages
+            self.pages
+                .log
                 .stand(format!("The session of {name} was restored in part: {}.", unused.join("; ")));
         }
         if let Some(tab) = document.tab {
-            self.commands.send(Command::SelectTab(tab));
+            self.state.commands.send(Command::SelectTab(tab));
         }
-        self.commands.send(Command::Say(format!("The session of {name} is restored.")));
+        self.state.commands.send(Command::Say(format!("The session of {name} is restored.")));
         true
     }
 
@@ -251,11 +254,11 @@ impl App {
         match problems {
             [] => {}
             [only] if only == document::NO_SESSION => {
-                self.messages.stand(format!("{path} is not a session file of flqr. It is left unchanged."));
+                self.pages.log.stand(format!("{path} is not a session file of flqr. It is left unchanged."));
             }
             _ => {
                 let problems = problems.join("; ");
-                self.messages.stand(format!(
+                self.pages.log.stand(format!(
                     "The session was read in part: {problems}. The file {path} is left unchanged."
                 ));
             }
@@ -400,7 +403,7 @@ impl App {
                 }
                 Outcome::Done(Ok(Saved::Written)) => {
                     self.say(format!("Session saved to {}.", path.display()));
-                    self.recent.note_session(&path);
+                    self.state.recent.note_session(&path);
                     self.save_recent();
                 }
                 Outcome::Done(Err(problem)) => self.fail(problem),
@@ -411,10 +414,12 @@ impl App {
 
     /// Takes over a session, after a question where changes of the model or runs would be replaced.
     fn offer_session(&mut self, document: Document, path: PathBuf, ctx: &Context) {
-        let is_other = |model: &Model| *model != self.session.model();
-        let loses_model = document.model.as_ref().is_some_and(is_other) && self.session != self.saved;
-        let loses_runs = document.runs.as_ref().is_some_and(|runs| self.runs.ledger().missing_in(runs) > 0);
-        if (loses_model || loses_runs) && !self.link.is_hot() {
+        let is_other = |model: &Model| *model != self.state.session.model();
+        let loses_model =
+            document.model.as_ref().is_some_and(is_other) && self.state.session != self.state.saved;
+        let loses_runs =
+            document.runs.as_ref().is_some_and(|runs| self.pages.runs.ledger().missing_in(runs) > 0);
+        if (loses_model || loses_runs) && !self.state.link.is_hot() {
             self.ask_replacement(Replacement::Session(Box::new(document), path));
         } else {
             self.take_session(&path, &document, ctx);
@@ -425,7 +430,7 @@ impl App {
     pub(super) fn take_session(&mut self, path: &Path, document: &Document, ctx: &Context) -> bool {
         let taken = self.take_document(&path.display().to_string(), document, ctx);
         if taken {
-            self.recent.note_session(path);
+            self.state.recent.note_session(path);
             self.save_recent();
         }
         taken
@@ -433,14 +438,14 @@ impl App {
 
     /// Asks before the window is closed while motors may have torque, or while the model has unsaved changes.
     pub(super) fn answer_close(&mut self, ctx: &Context) {
-        let may_have_torque = self.link.is_driven() || self.link.awaits_motors_off();
+        let may_have_torque = self.state.link.is_driven() || self.state.link.awaits_motors_off();
         if self.leaving && !may_have_torque {
             ctx.send_viewport_cmd(ViewportCommand::Close);
             return;
         }
         let question = match () {
             () if may_have_torque => Question::LeaveDriven,
-            () if self.session != self.saved => Question::Leave,
+            () if self.state.session != self.state.saved => Question::Leave,
             () => return,
         };
         if self.leaving || ctx.input(|input| input.viewport().close_requested()) {
@@ -457,7 +462,7 @@ impl App {
         if let Some(store) = &mut self.store {
             store.close(&text);
         }
-        let problems = self.link.end(&self.waker);
+        let problems = self.state.link.end(&self.waker);
         (!problems.is_empty()).then(|| problems.join("; "))
     }
 }

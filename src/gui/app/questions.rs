@@ -145,13 +145,14 @@ impl App {
         if let (Some(by), Some(Question::Replace { changes, .. } | Question::Preset { changes, .. })) =
             (by, &mut self.question)
         {
-            *changes = self.session.model().changes_to(&by);
+            *changes = self.state.session.model().changes_to(&by);
         }
     }
 
     /// Asks before a file replaces a model that has changes.
     pub(super) fn ask_replacement(&mut self, by: Replacement) {
-        let changes = by.model().map(|model| self.session.model().changes_to(model)).unwrap_or_default();
+        let changes =
+            by.model().map(|model| self.state.session.model().changes_to(model)).unwrap_or_default();
         self.ask(Question::Replace { by, changes });
     }
 
@@ -160,7 +161,7 @@ impl App {
         match preset(number) {
             None => {}
             Some(Ok(model)) => {
-                let changes = self.session.model().changes_to(&model);
+                let changes = self.state.session.model().changes_to(&model);
                 self.ask(Question::Preset { number, name: presets::ALL[number].0, changes });
             }
             Some(Err(error)) => self.fail(error),
@@ -170,7 +171,7 @@ impl App {
     /// Asks for a path, because there is no dialog or none is wanted.
     pub(super) fn ask_path(&mut self, purpose: FilePurpose, reason: Option<String>) {
         let text = match purpose {
-            FilePurpose::SaveModel => self.model_path.as_deref(),
+            FilePurpose::SaveModel => self.state.model_path.as_deref(),
             _ => None,
         };
         let text = text.map(|path| path.display().to_string()).unwrap_or_default();
@@ -191,11 +192,11 @@ impl App {
             ui.set_width(560.0_f32.min(ctx.content_rect().width() - 40.0).max(0.0));
             // The one of the strip cannot be reached behind this.
             let size = vec2(ui.available_width(), STOP_HEIGHT);
-            stop = self.link.is_hot() && stop_ui(ui, size).clicked();
+            stop = self.state.link.is_hot() && stop_ui(ui, size).clicked();
             self.ask_ui(&mut question, ui)
         });
         if stop {
-            self.link.stop();
+            self.state.link.stop();
         }
         if self.question_focus != modal.inner.focus {
             self.question_focus = modal.inner.focus;
@@ -210,23 +211,23 @@ impl App {
         match answer {
             Answer::Open => return self.question = Some(question),
             Answer::Close => self.leave_after_save = false,
-            Answer::Send(command) => self.commands.send(command),
+            Answer::Send(command) => self.state.commands.send(command),
             Answer::SaveAndLeave => {
                 self.leave_after_save = true;
-                match self.model_path.clone() {
-                    Some(path) => self.commands.send(Command::SaveModel(path)),
+                match self.state.model_path.clone() {
+                    Some(path) => self.state.commands.send(Command::SaveModel(path)),
                     None => self.ask_path(FilePurpose::SaveModel, None),
                 }
             }
             Answer::Discard => {
-                self.session = self.saved.clone();
+                self.state.session = self.state.saved.clone();
                 self.leaving = true;
             }
             Answer::Restore => {
                 if let Question::Restore { left, mut document, whole } = question {
                     if !whole && document.saved_model.is_none() {
                         // What its file has is not known, so it counts as changed.
-                        document.saved_model = Some(self.saved.model());
+                        document.saved_model = Some(self.state.saved.model());
                     }
                     if !self.take_document(&document_name(&document), &document, ctx) {
                         self.question = Some(Question::Restore { left, document, whole });
@@ -238,7 +239,7 @@ impl App {
                 }
             }
             Answer::StartAfresh => {
-                self.messages.release();
+                self.pages.log.release();
                 if let Question::Restore { left, .. } = question {
                     self.say(format!("The previous session remains in {}.", left.put_aside().display()));
                 }
@@ -265,12 +266,12 @@ impl App {
     fn ask_ui(&self, question: &mut Question, ui: &mut Ui) -> Reply {
         match question {
             Question::Leave => self.leave_ui(ui),
-            Question::LeaveDriven => leave_driven_ui(self.link.awaits_motors_off(), ui),
+            Question::LeaveDriven => leave_driven_ui(self.state.link.awaits_motors_off(), ui),
             Question::Gains { changes } => gains_ui(changes, ui),
             Question::Preset { number, name, changes } => preset_ui(*number, name, changes, ui),
             Question::Restore { document, whole, .. } => restore_ui(document, *whole, ui),
             Question::Path { purpose, text, reason, has_focus } => {
-                path_ui(*purpose, text, reason.as_deref(), has_focus, &self.recent, ui)
+                path_ui(*purpose, text, reason.as_deref(), has_focus, &self.state.recent, ui)
             }
             Question::Replace { by, changes } => self.replace_ui(by, changes, ui),
             Question::Overwrite { path, what, save } => overwrite_ui(path, what, save, ui),
@@ -280,8 +281,8 @@ impl App {
 
     fn leave_ui(&self, ui: &mut Ui) -> Reply {
         ui.heading("Save the model?");
-        ui.label(format!("“{}” has unsaved changes.", self.session.name));
-        changes_ui(&self.saved.model().changes_to(&self.session.model()), ["saved", "now"], ui);
+        ui.label(format!("“{}” has unsaved changes.", self.state.session.name));
+        changes_ui(&self.state.saved.model().changes_to(&self.state.session.model()), ["saved", "now"], ui);
         answers_ui(
             ui,
             [
@@ -296,15 +297,15 @@ impl App {
         let (Replacement::Model(_, path) | Replacement::Session(_, path)) = by;
         ui.heading(format!("Open {}?", path.display()));
         let mut losses = Vec::new();
-        let is_other = by.model().is_some_and(|model| *model != self.session.model());
-        if is_other && self.session != self.saved {
-            losses.push(format!("“{}” has unsaved changes.", self.session.name));
+        let is_other = by.model().is_some_and(|model| *model != self.state.session.model());
+        if is_other && self.state.session != self.state.saved {
+            losses.push(format!("“{}” has unsaved changes.", self.state.session.name));
         }
         let runs = match by {
             Replacement::Session(document, _) => document.runs.as_ref(),
             Replacement::Model(..) => None,
         };
-        let missing = runs.map_or(0, |runs| self.runs.ledger().missing_in(runs));
+        let missing = runs.map_or(0, |runs| self.pages.runs.ledger().missing_in(runs));
         if missing > 0 {
             losses.push(format!(
                 "{} of the Runs page that are not in the file are removed too.",

@@ -8,8 +8,8 @@ use super::App;
 use crate::command::{Command, Source};
 use crate::commands::{self, STOP_KEYS, keys_ui, menu_ui};
 use crate::layout::Side;
+use crate::pages::Tab;
 use crate::robot::bar_ui;
-use crate::tab::Tab;
 use crate::theme::palette;
 use crate::widgets::choice_ui;
 
@@ -24,11 +24,12 @@ impl App {
         self.shortcuts(ui);
         let bar = Frame::side_top_panel(ui.style()).inner_margin(Margin::symmetric(10, 5));
         Panel::top("head").frame(bar).show(ui, |ui| self.head_ui(ui));
-        if self.source != Source::Simulated {
-            let (link, page, commands) = (&self.link, (self.source, self.tab), &self.commands);
+        if self.state.source != Source::Simulated {
+            let (link, page, commands) =
+                (&self.state.link, (self.state.source, self.tab), &self.state.commands);
             let strip = Panel::top("robot strip").frame(bar);
             if strip.show(ui, |ui| bar_ui(link, page, commands, ui)).inner {
-                self.link.stop();
+                self.state.link.stop();
             }
         }
         Panel::bottom("status").frame(bar).show(ui, |ui| self.status_ui(ui));
@@ -41,31 +42,31 @@ impl App {
     }
 
     fn shortcuts(&mut self, ui: &Ui) {
-        if self.link.is_hot() && take_stop_keys(ui) {
-            self.link.stop();
+        if self.state.link.is_hot() && take_stop_keys(ui) {
+            self.state.link.stop();
         }
         if self.palette.is_some() || self.question.is_some() {
             return;
         }
         let Some(entry) = commands::pressed(ui.ctx()) else { return };
         match entry.send(&self.situation(ui.ctx())) {
-            Ok(command) => self.commands.send(command),
-            Err(reason) => self.commands.send(Command::Say(format!("{}: {reason}.", entry.name))),
+            Ok(command) => self.state.commands.send(command),
+            Err(reason) => self.state.commands.send(Command::Say(format!("{}: {reason}.", entry.name))),
         }
     }
 
     fn tour_ui(&mut self, ui: &Ui) {
         let Some(tour) = self.tour else { return };
-        self.tour = tour.ui(&self.commands, ui.ctx());
+        self.tour = tour.ui(&self.state.commands, ui.ctx());
         if self.tour.is_none() {
-            self.recent.tour_done = true;
+            self.state.recent.tour_done = true;
             self.save_recent();
         }
     }
 
     fn help_ui(&mut self, area: egui::Rect, ui: &Ui) {
         if let Some(help) = &mut self.help
-            && !help.ui(area, &self.commands, ui.ctx())
+            && !help.ui(area, &self.state.commands, ui.ctx())
         {
             self.help = None;
         }
@@ -73,7 +74,7 @@ impl App {
 
     fn palette_ui(&mut self, ui: &Ui) {
         let Some(mut palette) = self.palette.take() else { return };
-        if palette.ui(&self.situation(ui.ctx()), &self.commands, ui.ctx()) {
+        if palette.ui(&self.situation(ui.ctx()), &self.state.commands, ui.ctx()) {
             self.palette = Some(palette);
         }
     }
@@ -81,7 +82,7 @@ impl App {
     fn head_ui(&mut self, ui: &mut Ui) {
         let room = ui.available_width();
         ui.horizontal(|ui| {
-            menu_ui(&self.situation(ui.ctx()), &self.commands, ui);
+            menu_ui(&self.situation(ui.ctx()), &self.state.commands, ui);
             ui.scope(|ui| {
                 ui.spacing_mut().button_padding.x = 10.0;
                 ui.spacing_mut().item_spacing.x = 2.0;
@@ -116,7 +117,7 @@ impl App {
         ui.menu_button(self.tab.title(), |ui| {
             for tab in Tab::ALL {
                 if ui.selectable_label(tab == self.tab, tab.title()).on_hover_text(tab.help()).clicked() {
-                    self.commands.send(Command::SelectTab(tab));
+                    self.state.commands.send(Command::SelectTab(tab));
                     ui.close();
                 }
             }
@@ -131,12 +132,12 @@ impl App {
         let title = if shown && tab != self.tab { title.underline() } else { title };
         let button = ui.selectable_label(tab == self.tab, title).on_hover_text(help);
         if button.clicked() {
-            self.commands.send(Command::SelectTab(tab));
+            self.state.commands.send(Command::SelectTab(tab));
         }
         button.context_menu(|ui| {
             for side in Side::ALL {
                 if ui.button(format!("{} {}", tab.title(), side.words())).clicked() {
-                    self.commands.send(Command::MoveTab(tab, side));
+                    self.state.commands.send(Command::MoveTab(tab, side));
                     ui.close();
                 }
             }
@@ -147,12 +148,12 @@ impl App {
         let dark = ui.visuals().dark_mode;
         let help = commands::with_keys(ui.ctx(), "Switch between light and dark", "theme");
         if ui.button(if dark { "Light" } else { "Dark" }).on_hover_text(help).clicked() {
-            self.commands.send(Command::SetDark(!dark));
+            self.state.commands.send(Command::SetDark(!dark));
         }
     }
 
     fn model_name_ui(&self, ui: &mut Ui) {
-        let changed = self.session != self.saved;
+        let changed = self.state.session != self.state.saved;
         // A few letters of it say nothing.
         if ui.available_width() < LEAST_NAME_WIDTH {
             return;
@@ -161,7 +162,7 @@ impl App {
         let room = ui.available_width() - if changed { 66.0 } else { 0.0 };
         ui.scope(|ui| {
             ui.set_max_width(room.max(0.0));
-            let name = RichText::new(&self.session.name).strong();
+            let name = RichText::new(&self.state.session.name).strong();
             ui.add(egui::Label::new(name).truncate());
         });
         if changed {
@@ -172,13 +173,13 @@ impl App {
     }
 
     fn source_ui(&self, ui: &mut Ui) {
-        let mut source = self.source;
+        let mut source = self.state.source;
         // Drawn from the right, so the last comes first.
         let mut choices = Source::ALL;
         choices.reverse();
         ui.scope(|ui| {
             if choice_ui(ui, &mut source, &choices) {
-                self.commands.send(Command::SelectSource(source));
+                self.state.commands.send(Command::SelectSource(source));
             }
         });
         ui.label("Source");
@@ -186,10 +187,10 @@ impl App {
 
     /// The sources in one button.
     fn source_menu_ui(&self, ui: &mut Ui) {
-        ui.menu_button(self.source.name(), |ui| {
+        ui.menu_button(self.state.source.name(), |ui| {
             for (source, name, help) in Source::ALL {
-                if ui.selectable_label(source == self.source, name).on_hover_text(help).clicked() {
-                    self.commands.send(Command::SelectSource(source));
+                if ui.selectable_label(source == self.state.source, name).on_hover_text(help).clicked() {
+                    self.state.commands.send(Command::SelectSource(source));
                     ui.close();
                 }
             }
@@ -200,7 +201,7 @@ impl App {
         ui.horizontal(|ui| {
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                 self.numbers_ui(ui);
-                let Some((severity, text)) = self.messages.status() else { return };
+                let Some((severity, text)) = self.pages.log.status() else { return };
                 let color = severity.color(ui.visuals());
                 ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
                     let text = RichText::new(text).small().color(color);
@@ -224,23 +225,23 @@ impl App {
 
     /// State of the source and its losses.
     fn source_text(&self) -> (String, String, &'static str) {
-        if self.source != Source::Simulated {
-            let state = match (&self.link.status, self.link.is_open()) {
+        if self.state.source != Source::Simulated {
+            let state = match (&self.state.link.status, self.state.link.is_open()) {
                 (_, false) => "disconnected",
                 (Some(status), true) if status.connection == Connection::Ended => "ended",
                 _ => "connected",
             };
-            let counters = self.link.status.as_ref().map(|status| status.counters).unwrap_or_default();
+            let counters = self.state.link.status.as_ref().map(|status| status.counters).unwrap_or_default();
             return (
-                format!("{}: {state}", self.source.name()),
+                format!("{}: {state}", self.state.source.name()),
                 format!("late {}   lost {}   dropped {}", counters.late, counters.lost, counters.dropped),
                 "Late: control-loop ticks at least one period late. Lost: frames and samples that did not reach the loop, the window or the recording. Dropped: frames dropped by the system or the adapter",
             );
         }
-        let live = &self.live.status;
-        let state = if self.session.robot().is_none() {
+        let live = &self.state.live.status;
+        let state = if self.state.session.robot().is_none() {
             "no robot"
-        } else if self.designer.in_force.is_none() {
+        } else if self.state.designer.in_force.is_none() {
             "no design"
         } else if live.fell {
             "simulated: fallen"

@@ -10,10 +10,10 @@ use flqr_core::model_file::presets;
 use super::{Entry, Menu, Sent, Situation};
 use crate::command::{Command, FilePurpose, Source, Target};
 use crate::layout::Side;
+use crate::pages::Tab;
 use crate::plot::{FigureFile, FigureKind};
 use crate::refine::{Question, RefineCommand, RefineFile, SavedAs};
 use crate::runs::RunsCommand;
-use crate::tab::Tab;
 
 const fn ctrl(key: Key) -> KeyboardShortcut {
     KeyboardShortcut::new(Modifiers::COMMAND, key)
@@ -81,9 +81,7 @@ fn file() -> Vec<Entry> {
                     Tab::Robot if s.source == Source::Replay => FilePurpose::OpenReplay,
                     Tab::Friction => FilePurpose::OpenLog,
                     Tab::Refine => FilePurpose::Refine(RefineFile::Log),
-                    Tab::Tune | Tab::Experiments | Tab::Robot | Tab::Runs | Tab::Log => {
-                        FilePurpose::OpenModel
-                    }
+                    _ => FilePurpose::OpenModel,
                 }))
             },
         ),
@@ -377,11 +375,11 @@ fn run() -> Vec<Entry> {
             "Start or cancel the fit, the search or the experiment; connect or disconnect on the Robot page",
             &[ctrl(Key::Enter)],
             |s| match s.tab {
-                Tab::Tune | Tab::Runs | Tab::Log => Err("nothing to start on this page"),
                 Tab::Friction => start_fit(s),
                 Tab::Refine => Ok(start_refine(s)),
                 Tab::Experiments => Ok(start_experiment(s)),
                 Tab::Robot => Ok(connect(s)),
+                _ => Err("nothing to start on this page"),
             },
         ),
         entry(menu, "fit", "Start or cancel the fit", "Friction from the loaded log", &[], start_fit)
@@ -418,7 +416,7 @@ fn run() -> Vec<Entry> {
             "Use the effects in the model",
             "Add the effects selected on the Refine page and the corrected parameters to the model",
             &[],
-            |_| Ok(Command::Refine(RefineCommand::Use)),
+            |_| Ok(RefineCommand::Use.into()),
         )
         .also("refine add effects"),
         entry(
@@ -431,7 +429,7 @@ fn run() -> Vec<Entry> {
         )
         .also("friction add model"),
         entry(menu, "demo", "Run the demo", "Simulated robot with a hidden effect", &[], |_| {
-            Ok(Command::Refine(RefineCommand::Start(Question::Demo)))
+            Ok(RefineCommand::Start(Question::Demo).into())
         }),
         entry(
             menu,
@@ -439,7 +437,7 @@ fn run() -> Vec<Entry> {
             "Overlay the last two runs",
             "Overlay the last two runs of one kind on the Runs page",
             &[],
-            |_| Ok(Command::Runs(RunsCommand::OverlayLast)),
+            |_| Ok(RunsCommand::OverlayLast.into()),
         )
         .also("runs tick compare show draw"),
         entry(
@@ -448,11 +446,11 @@ fn run() -> Vec<Entry> {
             "Go to the runs",
             "Focus the newest row of the Runs page: arrow keys move, Space selects",
             &[],
-            |_| Ok(Command::Runs(RunsCommand::FocusRows)),
+            |_| Ok(RunsCommand::FocusRows.into()),
         )
         .also("rows table focus"),
         entry(menu, "untick-runs", "Deselect all runs", "Clear the selection on the Runs page", &[], |_| {
-            Ok(Command::Runs(RunsCommand::UntickAll))
+            Ok(RunsCommand::UntickAll.into())
         })
         .also("runs clear"),
         entry(menu, "experiment", "Run or cancel the experiment", "Both controllers", &[], |s| {
@@ -506,11 +504,7 @@ fn start_fit(s: &Situation<'_>) -> Sent {
 }
 
 fn ask(s: &Situation<'_>, question: Question) -> Sent {
-    if s.refine_runs {
-        Err("a search is running")
-    } else {
-        Ok(Command::Refine(RefineCommand::Start(question)))
-    }
+    if s.refine_runs { Err("a search is running") } else { Ok(RefineCommand::Start(question).into()) }
 }
 
 /// Opens the form that saves the plots of the page.
@@ -522,18 +516,14 @@ fn export(s: &Situation<'_>, kind: FigureKind) -> Sent {
         Tab::Runs => "overlay",
         Tab::Refine if s.has_residual => crate::refine::RESIDUAL_STACK,
         Tab::Refine => return Err("use “Find missing effects” to get the plots of this page"),
-        Tab::Tune | Tab::Friction | Tab::Robot | Tab::Log => return Err("this page has no plots now"),
+        _ => return Err("this page has no plots now"),
     };
     let asks = "Type or choose the path to save to.".to_owned();
     Ok(Command::ChooseFigure(FigureFile { stack, kind }, Err(asks)))
 }
 
 fn start_refine(s: &Situation<'_>) -> Command {
-    Command::Refine(if s.refine_runs {
-        RefineCommand::Cancel
-    } else {
-        RefineCommand::Start(Question::Refine)
-    })
+    (if s.refine_runs { RefineCommand::Cancel } else { RefineCommand::Start(Question::Refine) }).into()
 }
 
 fn start_experiment(s: &Situation<'_>) -> Command {

@@ -12,7 +12,7 @@ use egui::{Context, KeyboardShortcut};
 use flqr_core::control::ControllerKind;
 
 use crate::command::{Command, Source};
-use crate::tab::Tab;
+use crate::pages::Tab;
 
 pub(crate) use entries::{GESTURES, STOP_KEYS};
 pub(crate) use menu::{keys_ui, menu_ui};

@@ -15,8 +15,8 @@ use serde_json::{Value, json};
 
 use crate::command::Source;
 use crate::layout::Node;
+use crate::pages::Tab;
 use crate::runs::Ledger;
-use crate::tab::Tab;
 use members::members;
 pub use store::default_folder;
 pub(crate) use store::{Left, Opened, Store, open, put_aside};

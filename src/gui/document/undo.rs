@@ -245,7 +245,7 @@ mod tests {
 
     use super::*;
     use crate::layout::Side;
-    use crate::tab::Tab;
+    use crate::pages::Tab;
 
     fn begin() -> Undo {
         let session = Session::new(presets::paper(), ControllerKind::Flqr);

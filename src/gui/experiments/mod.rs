@@ -16,15 +16,18 @@ mod side_view;
 mod signals;
 mod table;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use egui::{Color32, Context, Rect, RichText, Ui, Vec2, vec2};
 use flqr_core::model::{Model, RobotModel};
 use flqr_core::simulate::{Scenario, Summary};
+use serde_json::{Value, json};
 
 use crate::command::{Commands, FilePurpose};
 use crate::context::ViewContext;
 use crate::job::Waker;
+use crate::messages::{Said, said};
+use crate::pages::Page;
 use crate::panes::{MARGIN, Pane, panes_ui};
 use crate::plot::Marks;
 use crate::runs::RunsTab;
@@ -94,18 +97,13 @@ impl ExperimentsTab {
         self.limited = Limited::default();
     }
 
-    /// The command that makes the run with friction compensation.
-    pub(crate) fn command_line(&self, model: Option<&Path>) -> String {
-        run::command_line(&self.settings, Variant::Compensated, model)
-    }
-
     /// For a session file.
-    pub(crate) fn to_value(&self) -> serde_json::Value {
+    pub(crate) fn to_value(&self) -> Value {
         self.settings.to_value()
     }
 
     /// From a session file.
-    pub(crate) fn take_value(&mut self, value: &serde_json::Value) -> Result<(), String> {
+    pub(crate) fn take_value(&mut self, value: &Value) -> Result<(), String> {
         self.set_settings(Settings::from_value(value)?);
         Ok(())
     }
@@ -141,27 +139,6 @@ impl ExperimentsTab {
         self.limited = Limited::default();
     }
 
-    /// Name that a dialog offers.
-    pub(crate) fn suggested_name(&self, saved_as: SavedAs) -> String {
-        format!("{}.{}", self.settings.scenario.name(), saved_as.extension())
-    }
-
-    /// Goes to the path to save to.
-    pub(crate) fn focus_path(&mut self) {
-        self.saver.focus_path = true;
-    }
-
-    pub(crate) fn note_dialog_problem(&mut self, purpose: FilePurpose, problem: &str) {
-        if matches!(purpose, FilePurpose::SaveExperiment(_)) {
-            self.saver.problem = Some(problem.to_owned());
-        }
-    }
-
-    /// A sentence when something was saved, or could not be.
-    pub(crate) fn drain_saver(&mut self) -> Option<Result<String, String>> {
-        self.saver.drain()
-    }
-
     /// Gives the runs that have just ended their rows in the ledger.
     pub(crate) fn note_runs(&self, runs: &mut RunsTab) {
         if let Some(comparison) = self.runs.comparison() {
@@ -177,88 +154,9 @@ impl ExperimentsTab {
         self.runs.is_running()
     }
 
-    /// Takes in what the workers have brought; a sentence if something ended.
-    pub(crate) fn drain(&mut self) -> Option<String> {
-        let generation = |runs: &Runs| runs.comparison().map(|comparison| comparison.generation);
-        let before = generation(&self.runs);
-        let message = self.runs.drain();
-        if generation(&self.runs) != before
-            && let Some(comparison) = self.runs.comparison()
-        {
-            let limits = [0.0, comparison.end_s()];
-            self.marks = Marks::new(limits);
-            let step = comparison.recorded().any(|(_, run)| run.tracking().is_some());
-            let shown_s = if step { STEP_VIEW_S.min(limits[1]) } else { limits[1] };
-            self.plots.stack.view.show_all([0.0, shown_s]);
-            self.table.choice = match self.table.choice {
-                Choice::Chosen(range) if range[1] <= limits[1] => Choice::Chosen(range),
-                _ => Choice::Usual,
-            };
-            self.playback.playing = false;
-        }
-        message
-    }
-
     /// Lets the time run while it plays.
     pub(crate) fn advance(&mut self, ctx: &Context) {
         self.playback.advance(ctx, &mut self.marks);
-    }
-
-    /// State of the page for `--state-out`.
-    pub(crate) fn snapshot(&self) -> serde_json::Value {
-        let runs = self.runs.comparison().map(|comparison| {
-            let range = self.table.range(comparison, self.plots.stack.view.range());
-            let found = comparison.statistics_between(range);
-            let runs = Variant::ALL.iter().zip(&comparison.runs).zip(found);
-            runs.map(|((variant, run), statistics)| snapshot_of(comparison, *variant, run, statistics))
-                .collect::<Vec<_>>()
-        });
-        serde_json::json!({
-            "scenario": self.settings.scenario.name(),
-            "seconds": self.settings.seconds,
-            "seed": self.settings.seed,
-            "running": self.is_running(),
-            "runs": runs.unwrap_or_default(),
-            "range_s": self.runs.comparison().map(|_| self.marks.range),
-            "cursor_s": self.marks.cursor,
-            "playing": self.playback.playing,
-        })
-    }
-
-    pub(crate) fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
-        let arrows = !self.plots.stack.has_cursors();
-        self.playback.keys(ui, arrows, &mut self.marks);
-        let form = Pane::left(Part::Form, "Experiment", 260.0, 240.0..=420.0).in_front(self.saver.focus_path);
-        let Some(comparison) = self.runs.comparison().cloned() else {
-            let panes = [form, Pane::middle(Part::Plots, "Plots", 300.0)];
-            panes_ui(ui, "no experiment", &panes, |part, ui| match part {
-                Part::Form => self.form_ui(context, ui),
-                _ => {
-                    let hint = "Choose an experiment on the left and run it. Both controllers are shown here side by side.";
-                    empty_page_ui(ui, "No run yet.", hint, |_| {});
-                }
-            });
-            return;
-        };
-        self.marks.range = self.table.range(&comparison, self.plots.stack.view.range());
-        self.marks.shade = self.table.choice != Choice::Visible && self.marks.range != self.marks.limits;
-        let page = ui.available_rect_before_wrap();
-        self.page = page;
-        let width = (0.29 * ui.ctx().content_rect().width()).clamp(372.0, 560.0);
-        let panes = [
-            form,
-            Pane::middle(Part::Plots, "Plots", 400.0),
-            Pane::right(Part::Robot, "Robot and statistics", width, 300.0..=900.0),
-        ];
-        panes_ui(ui, "experiments", &panes, |part, ui| match part {
-            Part::Form => self.form_ui(context, ui),
-            Part::Plots => {
-                // A picture of the page leaves the form out.
-                self.page = page.with_min_x(ui.max_rect().left() - MARGIN);
-                self.plots_ui(&comparison, context.commands, ui);
-            }
-            Part::Robot => self.robot_ui(&comparison, ui),
-        });
     }
 
     fn form_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
@@ -354,6 +252,115 @@ impl ExperimentsTab {
             }
         });
     }
+
+    /// Takes in what the workers have brought; a sentence if something ended.
+    fn drain_runs(&mut self) -> Option<String> {
+        let generation = |runs: &Runs| runs.comparison().map(|comparison| comparison.generation);
+        let before = generation(&self.runs);
+        let message = self.runs.drain();
+        if generation(&self.runs) != before
+            && let Some(comparison) = self.runs.comparison()
+        {
+            let limits = [0.0, comparison.end_s()];
+            self.marks = Marks::new(limits);
+            let step = comparison.recorded().any(|(_, run)| run.tracking().is_some());
+            let shown_s = if step { STEP_VIEW_S.min(limits[1]) } else { limits[1] };
+            self.plots.stack.view.show_all([0.0, shown_s]);
+            self.table.choice = match self.table.choice {
+                Choice::Chosen(range) if range[1] <= limits[1] => Choice::Chosen(range),
+                _ => Choice::Usual,
+            };
+            self.playback.playing = false;
+        }
+        message
+    }
+}
+
+impl Page for ExperimentsTab {
+    fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
+        let arrows = !self.plots.stack.has_cursors();
+        self.playback.keys(ui, arrows, &mut self.marks);
+        let form = Pane::left(Part::Form, "Experiment", 260.0, 240.0..=420.0).in_front(self.saver.focus_path);
+        let Some(comparison) = self.runs.comparison().cloned() else {
+            let panes = [form, Pane::middle(Part::Plots, "Plots", 300.0)];
+            panes_ui(ui, "no experiment", &panes, |part, ui| match part {
+                Part::Form => self.form_ui(context, ui),
+                _ => {
+                    let hint = "Choose an experiment on the left and run it. Both controllers are shown here side by side.";
+                    empty_page_ui(ui, "No run yet.", hint, |_| {});
+                }
+            });
+            return;
+        };
+        self.marks.range = self.table.range(&comparison, self.plots.stack.view.range());
+        self.marks.shade = self.table.choice != Choice::Visible && self.marks.range != self.marks.limits;
+        let page = ui.available_rect_before_wrap();
+        self.page = page;
+        let width = (0.29 * ui.ctx().content_rect().width()).clamp(372.0, 560.0);
+        let panes = [
+            form,
+            Pane::middle(Part::Plots, "Plots", 400.0),
+            Pane::right(Part::Robot, "Robot and statistics", width, 300.0..=900.0),
+        ];
+        panes_ui(ui, "experiments", &panes, |part, ui| match part {
+            Part::Form => self.form_ui(context, ui),
+            Part::Plots => {
+                // A picture of the page leaves the form out.
+                self.page = page.with_min_x(ui.max_rect().left() - MARGIN);
+                self.plots_ui(&comparison, context.commands, ui);
+            }
+            Part::Robot => self.robot_ui(&comparison, ui),
+        });
+    }
+
+    fn snapshot(&self, _: &ViewContext<'_>) -> Value {
+        let runs = self.runs.comparison().map(|comparison| {
+            let range = self.table.range(comparison, self.plots.stack.view.range());
+            let found = comparison.statistics_between(range);
+            let runs = Variant::ALL.iter().zip(&comparison.runs).zip(found);
+            runs.map(|((variant, run), statistics)| snapshot_of(comparison, *variant, run, statistics))
+                .collect::<Vec<_>>()
+        });
+        json!({
+            "scenario": self.settings.scenario.name(),
+            "seconds": self.settings.seconds,
+            "seed": self.settings.seed,
+            "running": self.is_running(),
+            "runs": runs.unwrap_or_default(),
+            "range_s": self.runs.comparison().map(|_| self.marks.range),
+            "cursor_s": self.marks.cursor,
+            "playing": self.playback.playing,
+        })
+    }
+
+    fn command_line(&self, context: &ViewContext<'_>) -> Result<String, String> {
+        Ok(run::command_line(&self.settings, Variant::Compensated, context.model_path))
+    }
+
+    fn drain(&mut self) -> Vec<Said> {
+        let results = self.drain_runs().map(Ok).into_iter().chain(self.saver.drain());
+        results.map(said).collect()
+    }
+
+    fn focus_path(&mut self) -> bool {
+        self.saver.focus_path = true;
+        true
+    }
+
+    fn suggested_name(&self, purpose: FilePurpose) -> Option<String> {
+        match purpose {
+            FilePurpose::SaveExperiment(saved_as) => {
+                Some(format!("{}.{}", self.settings.scenario.name(), saved_as.extension()))
+            }
+            _ => None,
+        }
+    }
+
+    fn note_dialog_problem(&mut self, purpose: FilePurpose, problem: &str) {
+        if matches!(purpose, FilePurpose::SaveExperiment(_)) {
+            self.saver.problem = Some(problem.to_owned());
+        }
+    }
 }
 
 fn legend_ui(ui: &mut Ui, name: &str, color: Color32) {
@@ -406,17 +413,16 @@ fn snapshot_of(
     variant: Variant,
     run: &Result<Box<run::Recorded>, String>,
     statistics: Option<Vec<Summary>>,
-) -> serde_json::Value {
+) -> Value {
     let controller = variant.name(comparison.settings.scenario);
     let run = match run {
-        Err(problem) => return serde_json::json!({ "controller": controller, "problem": problem }),
+        Err(problem) => return json!({ "controller": controller, "problem": problem }),
         Ok(run) => run,
     };
     let keys = comparison.signals(false).into_iter().map(|signal| signal.key.to_owned());
-    let statistics = statistics.map(|all| {
-        keys.zip(all.into_iter().map(|s| serde_json::json!(s))).collect::<serde_json::Map<_, _>>()
-    });
-    serde_json::json!({
+    let statistics =
+        statistics.map(|all| keys.zip(all.into_iter().map(|s| json!(s))).collect::<serde_json::Map<_, _>>());
+    json!({
         "controller": controller,
         "statistics": statistics,
         "settled": run.settled(),

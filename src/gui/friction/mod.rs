@@ -12,6 +12,7 @@ use std::path::Path;
 
 use egui::Ui;
 use flqr_core::model::Model;
+use serde_json::{Value, json};
 
 use crate::column_map::ColumnMapForm;
 use crate::command::FilePurpose;
@@ -19,6 +20,7 @@ use crate::context::ViewContext;
 use crate::job::Waker;
 use crate::load::Loader;
 use crate::messages::Said;
+use crate::pages::Page;
 use crate::panes::{Pane, panes_ui};
 use crate::runs::{Run, RunsTab};
 use fit::FitRun;
@@ -55,16 +57,6 @@ impl FrictionTab {
         }
     }
 
-    pub(crate) fn focus_path(&mut self) {
-        self.source.focus_path = true;
-    }
-
-    pub(crate) fn note_dialog_problem(&mut self, purpose: FilePurpose, problem: &str) {
-        if purpose == FilePurpose::OpenLog {
-            self.source.dialog_problem = Some(problem.to_owned());
-        }
-    }
-
     /// Starts loading; the log of before and its fit stay until the new one is complete.
     pub(crate) fn load(&mut self, path: &Path, waker: &Waker) -> Result<(), String> {
         self.source.path = path.display().to_string();
@@ -84,7 +76,7 @@ impl FrictionTab {
         path: Option<&Path>,
         waker: &Waker,
     ) -> Result<(), String> {
-        let command = self.command_line(path).ok();
+        let command = self.fit_command(path).ok();
         let Some(loaded) = self.loader.log() else {
             return Err("There is no log to fit. Load one first.".to_owned());
         };
@@ -101,7 +93,7 @@ impl FrictionTab {
     }
 
     /// The command that makes the fit of the loaded log.
-    pub(crate) fn command_line(&self, model: Option<&Path>) -> Result<String, String> {
+    fn fit_command(&self, model: Option<&Path>) -> Result<String, String> {
         let log = self.log_path().ok_or("There is no log to fit. Load one first.")?;
         let map = self.source.column_map.parse()?;
         Ok(self.fit.command_line(log, map.entries(), model))
@@ -120,44 +112,11 @@ impl FrictionTab {
         self.fit.fitted()
     }
 
-    /// Takes in what the workers have brought; a sentence if something ended.
-    pub(crate) fn drain(&mut self) -> Option<Said> {
-        let generation = |loader: &Loader| loader.log().map(|loaded| loaded.generation);
-        let before = generation(&self.loader);
-        let loaded = self.loader.drain("“Data health” on the Friction page");
-        if generation(&self.loader) != before {
-            self.fit.discard();
-            self.preview = Preview::default();
-        }
-        self.fit.drain().or(loaded)
-    }
-
     /// Gives a fit that has just ended its row.
     pub(crate) fn note_run(&mut self, ledger: &mut RunsTab) {
         if let Some(row) = self.fit.finished.take() {
             self.fit.row = Some(Run { number: ledger.note(row.clone()), ..row });
         }
-    }
-
-    pub(crate) fn snapshot(&self) -> serde_json::Value {
-        serde_json::json!({ "log": self.loader.snapshot(), "fit": self.fit.snapshot() })
-    }
-
-    pub(crate) fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
-        let panes = [
-            Pane::left(Part::Log, "Log and fit", 330.0, 280.0..=480.0).in_front(self.source.focus_path),
-            Pane::middle(Part::Plots, "Plots", 380.0).at_least(540.0),
-            Pane::right(Part::Result, "Result", 300.0, 250.0..=460.0),
-        ];
-        panes_ui(ui, "friction", &panes, |part, ui| match part {
-            Part::Log => {
-                self.source.ui(context, &self.loader, ui);
-                source::health_ui(&self.loader, ui);
-                self.fit.options_ui(context, self.loader.log(), ui);
-            }
-            Part::Plots => self.plots_ui(context, ui),
-            Part::Result => result::ui(context, &self.fit, ui),
-        });
     }
 
     /// The log above what the fit makes of it.
@@ -175,6 +134,55 @@ impl FrictionTab {
         }
         let kind = self.loader.log().and_then(|loaded| loaded.kind.as_ref().ok().copied());
         charts::ui(context, &self.fit, kind, ui);
+    }
+}
+
+impl Page for FrictionTab {
+    fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
+        let panes = [
+            Pane::left(Part::Log, "Log and fit", 330.0, 280.0..=480.0).in_front(self.source.focus_path),
+            Pane::middle(Part::Plots, "Plots", 380.0).at_least(540.0),
+            Pane::right(Part::Result, "Result", 300.0, 250.0..=460.0),
+        ];
+        panes_ui(ui, "friction", &panes, |part, ui| match part {
+            Part::Log => {
+                self.source.ui(context, &self.loader, ui);
+                source::health_ui(&self.loader, ui);
+                self.fit.options_ui(context, self.loader.log(), ui);
+            }
+            Part::Plots => self.plots_ui(context, ui),
+            Part::Result => result::ui(context, &self.fit, ui),
+        });
+    }
+
+    fn snapshot(&self, _: &ViewContext<'_>) -> Value {
+        json!({ "log": self.loader.snapshot(), "fit": self.fit.snapshot() })
+    }
+
+    fn command_line(&self, context: &ViewContext<'_>) -> Result<String, String> {
+        self.fit_command(context.model_path)
+    }
+
+    fn drain(&mut self) -> Vec<Said> {
+        let generation = |loader: &Loader| loader.log().map(|loaded| loaded.generation);
+        let before = generation(&self.loader);
+        let loaded = self.loader.drain("“Data health” on the Friction page");
+        if generation(&self.loader) != before {
+            self.fit.discard();
+            self.preview = Preview::default();
+        }
+        self.fit.drain().or(loaded).into_iter().collect()
+    }
+
+    fn focus_path(&mut self) -> bool {
+        self.source.focus_path = true;
+        true
+    }
+
+    fn note_dialog_problem(&mut self, purpose: FilePurpose, problem: &str) {
+        if purpose == FilePurpose::OpenLog {
+            self.source.dialog_problem = Some(problem.to_owned());
+        }
     }
 }
 

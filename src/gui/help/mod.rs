@@ -7,7 +7,7 @@ mod pages;
 use egui::{Align, Context, Key, Modifiers, Rect, RichText, ScrollArea, TextEdit, Ui, Window, vec2};
 
 use crate::command::{Command, Commands};
-use crate::tab::Tab;
+use crate::pages::Tab;
 use crate::theme::palette;
 use crate::widgets::hint_ui;
 use blocks::{Columns, block_ui};

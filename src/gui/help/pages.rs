@@ -3,7 +3,7 @@
 use std::sync::LazyLock;
 
 use super::markdown::{Block, Link, parse};
-use crate::tab::Tab;
+use crate::pages::Tab;
 
 /// Files of the manual in the order of its index.
 const FILES: [(&str, &str); 15] = [
@@ -74,15 +74,7 @@ pub(super) static PAGES: LazyLock<Vec<Page>> = LazyLock::new(|| {
 
 /// Page and heading that describe a page of the window.
 pub(super) fn place_of(tab: Tab) -> Place {
-    let (file, anchor) = match tab {
-        Tab::Tune => ("design.md", None),
-        Tab::Friction => ("friction.md", None),
-        Tab::Refine => ("refine.md", None),
-        Tab::Experiments => ("simulate.md", None),
-        Tab::Robot => ("robot.md", None),
-        Tab::Runs => ("window.md", Some("run-ledger")),
-        Tab::Log => ("window.md", Some("messages")),
-    };
+    let (file, anchor) = tab.manual();
     place(0, file, anchor).unwrap_or_default()
 }
 

@@ -7,7 +7,7 @@ use egui_tiles::{
     Behavior, Container, LinearDir, SimplificationOptions, Tabs, Tile, TileId, Tiles, Tree, UiResponse,
 };
 
-use crate::tab::Tab;
+use crate::pages::Tab;
 pub(crate) use node::{Node, Side};
 
 /// Below this width nothing is of use, whatever scrolls.

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use crate::tab::Tab;
+use crate::pages::Tab;
 
 /// Position of a page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -9,7 +9,6 @@ use flqr_core::simulate::Scenario;
 use super::command::RefineCommand;
 use super::run::verdict_text;
 use super::strip::{StepState, Tone};
-use crate::command::Command;
 use crate::context::ViewContext;
 use crate::theme::palette;
 use crate::widgets::{hint_ui, mono, section_ui, shown, warning_ui};
@@ -112,7 +111,7 @@ pub(super) fn next_ui(context: &ViewContext<'_>, next: &NextExperiment, ui: &mut
             let start = ui.button("Start on the simulated robot");
             let help = format!("Go to the experiments with “{}”", scenario.title());
             if start.on_hover_text(help).clicked() {
-                context.commands.send(Command::Refine(RefineCommand::Simulate(scenario)));
+                context.commands.send(RefineCommand::Simulate(scenario));
             }
         }
         if let Some(command) = &next.command

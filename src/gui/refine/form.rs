@@ -6,7 +6,6 @@ use flqr_core::model::{Motor, Rig};
 use super::command::RefineCommand;
 use super::run::{Question, Run, Settings, is_of_demo};
 use super::sources::Sources;
-use crate::command::Command;
 use crate::context::ViewContext;
 use crate::widgets::{choice_ui, entry_ui, error_ui, hint_ui, section_ui};
 
@@ -55,7 +54,7 @@ fn settings_ui(context: &ViewContext<'_>, settings: &mut Settings, ui: &mut Ui) 
 }
 
 fn run_ui(context: &ViewContext<'_>, sources: &Sources, run: &Run, ui: &mut Ui) {
-    let send = |command| context.commands.send(Command::Refine(command));
+    let send = |command| context.commands.send(command);
     if let Some((question, share)) = run.running() {
         if ui.button("Cancel search").on_hover_text("Stop it (Ctrl+Enter)").clicked() {
             send(RefineCommand::Cancel);
@@ -97,7 +96,7 @@ fn demo_ui(context: &ViewContext<'_>, sources: &Sources, ui: &mut Ui) {
     let help = "Simulates a robot with a hidden effect, selected by the seed, and identifies it. Replaces the logs in the list";
     let why_not = "Needs the unchanged preset of the paper's robot: load it on the Tune page";
     if demo.on_hover_text(help).on_disabled_hover_text(why_not).clicked() {
-        context.commands.send(Command::Refine(RefineCommand::Start(Question::Demo)));
+        context.commands.send(RefineCommand::Start(Question::Demo));
     }
 }
 

@@ -19,13 +19,13 @@ use egui::{Frame, Margin, Panel, RichText, ScrollArea, Ui};
 use flqr_core::model::Model;
 use flqr_core::refine::{Refinement, Verdict};
 use flqr_core::report::{Block, Tone as ReportTone};
-use flqr_core::simulate::Scenario;
+use serde_json::{Value, json};
 
 use crate::column_map::ColumnMapForm;
-use crate::command::Command;
+use crate::command::FilePurpose;
 use crate::context::ViewContext;
-use crate::job::Waker;
-use crate::messages::Said;
+use crate::messages::{Said, said};
+use crate::pages::{Done, Page, PageCommand, Pages, Surroundings, Tab};
 use crate::panes::{Pane, panes_ui};
 use crate::runs::Run as LedgerRow;
 use crate::save_form::{FileKind, SaveForm};
@@ -64,25 +64,6 @@ pub(crate) struct RefineTab {
     saving: Option<Model>,
 }
 
-/// Parts of the window available to the page's commands.
-pub(crate) struct Surroundings<'a> {
-    pub(crate) session: &'a mut Session,
-    /// The file that holds the very model of the session.
-    pub(crate) model_path: Option<PathBuf>,
-    pub(crate) waker: &'a Waker,
-}
-
-/// Request of a page command to the window.
-#[derive(Default)]
-pub(crate) struct Done {
-    /// For the status line.
-    pub(crate) said: Option<String>,
-    /// An experiment to go to.
-    pub(crate) scenario: Option<Scenario>,
-    /// A log to remember.
-    pub(crate) log: Option<PathBuf>,
-}
-
 /// Relation of a result to the current inputs.
 enum Standing {
     Fresh,
@@ -110,11 +91,6 @@ impl RefineTab {
         }
     }
 
-    /// Goes to the path of a log.
-    pub(crate) fn focus_path(&mut self) {
-        self.sources.focus_path();
-    }
-
     pub(crate) fn has_logs(&self) -> bool {
         !self.sources.list.is_empty()
     }
@@ -139,40 +115,6 @@ impl RefineTab {
         self.run.running().is_some()
     }
 
-    pub(crate) fn note_dialog_problem(&mut self, purpose: RefineFile, problem: &str) {
-        match purpose {
-            RefineFile::Log => self.sources.dialog_problem = Some(problem.to_owned()),
-            RefineFile::Save(_) => self.saver.problem = Some(problem.to_owned()),
-        }
-    }
-
-    /// Applies a request of the page.
-    ///
-    /// # Errors
-    /// A sentence says why it was not done.
-    pub(crate) fn apply(&mut self, command: RefineCommand, around: Surroundings<'_>) -> Result<Done, String> {
-        let mut done = Done::default();
-        match command {
-            RefineCommand::Load { path, held_out } => {
-                // A path that means the same wherever the session is opened.
-                let path = std::path::absolute(&path).unwrap_or(path);
-                self.sources.load(&path, held_out, around.waker)?;
-                done.log = Some(path);
-            }
-            RefineCommand::Clear => self.sources.list.clear(),
-            RefineCommand::Remove(id) => self.sources.remove(id),
-            RefineCommand::HoldOut(id, held_out) => self.sources.hold_out(id, held_out),
-            RefineCommand::Start(question) => self.start(question, around)?,
-            RefineCommand::Cancel => self.run.cancel(),
-            RefineCommand::Use => done.said = Some(self.put_into(around.session)?),
-            RefineCommand::Simulate(scenario) => done.scenario = Some(scenario),
-            RefineCommand::Save { saved_as, path, replace } => {
-                self.save(saved_as, path, replace, &around)?;
-            }
-        }
-        Ok(done)
-    }
-
     fn start(&mut self, question: Question, around: Surroundings<'_>) -> Result<(), String> {
         if let (Some(why_not), true) = (form::why_not(&self.sources), question != Question::Demo) {
             return Err(why_not.to_owned());
@@ -182,14 +124,6 @@ impl RefineTab {
             return Err("The demo needs the unchanged preset of the paper's robot.".to_owned());
         }
         self.run.start(question, made, around.model_path, around.waker)
-    }
-
-    /// The command that puts the question of this page; `model` is the file that holds the session's model.
-    pub(crate) fn command_line(&self, session: &Session, model: Option<&Path>) -> Result<String, String> {
-        match form::why_not(&self.sources) {
-            Some(why_not) => Err(why_not.to_owned()),
-            None => Ok(self.made(session).command_line(Question::Refine, model)),
-        }
     }
 
     /// Inputs of a search started now.
@@ -297,88 +231,6 @@ impl RefineTab {
         }
     }
 
-    /// Name that a dialog offers.
-    pub(crate) fn suggested_name(&self, saved_as: SavedAs) -> String {
-        format!("refined.{}", saved_as.extension())
-    }
-
-    /// Takes in what the workers have brought; a sentence if something ended.
-    pub(crate) fn drain(&mut self) -> Option<Said> {
-        let loaded = self.sources.drain();
-        let Some(Drained { question, said, answered, records }) = self.run.drain() else { return loaded };
-        if let Some(records) = records {
-            self.sources.replace(records);
-        }
-        if let Some(refined) = &self.run.refined
-            && self.ticked != refined.generation
-        {
-            self.ticked = refined.generation;
-            self.ticks = vec![true; refined.answer.effects.len()];
-            self.chosen = Some(refined.answer.model.clone());
-        }
-        if answered {
-            self.step = match (question, self.found().map(|found| found.verdict)) {
-                (Question::Residual, _) => Step::Residual,
-                (Question::Refine | Question::Demo, Some(Verdict::DataUnfit)) => Step::Health,
-                (Question::Refine | Question::Demo, _) => Step::Add,
-            };
-        }
-        Some(said)
-    }
-
-    /// A sentence when something was saved, or could not be.
-    pub(crate) fn drain_saver(&mut self) -> Option<Result<String, String>> {
-        self.saver.drain()
-    }
-
-    /// State of the page for `--state-out`.
-    pub(crate) fn snapshot(&self, session: &Session) -> serde_json::Value {
-        let standing = self.standing_of_refined(session).map(|standing| match standing {
-            Standing::Fresh => "fresh",
-            Standing::InModel => "in_model",
-            Standing::Stale(_) => "stale",
-        });
-        let command = self
-            .run
-            .refined
-            .as_ref()
-            .map(|refined| refined.made.command_line(Question::Refine, refined.model_path.as_deref()));
-        serde_json::json!({
-            "step": self.step.key(),
-            "logs": self.sources.snapshot(),
-            "running": self.run.running().map(|(question, _)| question.name()),
-            "problem": self.run.problem,
-            "residual": self.run.residual.as_ref().map(|residual| &residual.answer),
-            "refinement": self.found(),
-            "ticks": self.ticks,
-            "truth": self.run.truth,
-            "standing": standing,
-            "command": command,
-        })
-    }
-
-    pub(crate) fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
-        let side = Frame::side_top_panel(ui.style()).inner_margin(Margin::symmetric(10, 6));
-        let states = self.states(context.session);
-        Panel::top("steps of the loop").frame(side).show(ui, |ui| strip::ui(&mut self.step, &states, ui));
-        let panes = [
-            Pane::left(Part::Sources, "Logs and search", 330.0, 280.0..=480.0)
-                .in_front(self.sources.focus_path || self.saver.focus_path),
-            Pane::middle(Part::Step, "Step of the loop", 380.0),
-        ];
-        panes_ui(ui, "refine", &panes, |part, ui| match part {
-            Part::Sources => {
-                self.sources.ui(context, ui);
-                form::ui(context, &mut self.settings, &self.sources, &self.run, ui);
-                self.commands_ui(context, ui);
-                if self.run.refined.is_some() {
-                    save::ui(&mut self.saver, context, ui);
-                }
-            }
-            Part::Step => self.step_pane_ui(context, ui),
-        });
-    }
-
     fn step_pane_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
         self.stale_ui(context, ui);
         if self.step == Step::Residual && (self.run.refined.is_some() || self.run.residual.is_some()) {
@@ -483,6 +335,112 @@ impl RefineTab {
             hint_ui(ui, "This model is unsaved: save it and replace MODEL.toml by its path.");
         }
     }
+
+    /// Takes in what the workers have brought; a sentence if something ended.
+    fn drain_jobs(&mut self) -> Option<Said> {
+        let loaded = self.sources.drain();
+        let Some(Drained { question, said, answered, records }) = self.run.drain() else { return loaded };
+        if let Some(records) = records {
+            self.sources.replace(records);
+        }
+        if let Some(refined) = &self.run.refined
+            && self.ticked != refined.generation
+        {
+            self.ticked = refined.generation;
+            self.ticks = vec![true; refined.answer.effects.len()];
+            self.chosen = Some(refined.answer.model.clone());
+        }
+        if answered {
+            self.step = match (question, self.found().map(|found| found.verdict)) {
+                (Question::Residual, _) => Step::Residual,
+                (Question::Refine | Question::Demo, Some(Verdict::DataUnfit)) => Step::Health,
+                (Question::Refine | Question::Demo, _) => Step::Add,
+            };
+        }
+        Some(said)
+    }
+}
+
+impl Page for RefineTab {
+    fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
+        let side = Frame::side_top_panel(ui.style()).inner_margin(Margin::symmetric(10, 6));
+        let states = self.states(context.session);
+        Panel::top("steps of the loop").frame(side).show(ui, |ui| strip::ui(&mut self.step, &states, ui));
+        let panes = [
+            Pane::left(Part::Sources, "Logs and search", 330.0, 280.0..=480.0)
+                .in_front(self.sources.focus_path || self.saver.focus_path),
+            Pane::middle(Part::Step, "Step of the loop", 380.0),
+        ];
+        panes_ui(ui, "refine", &panes, |part, ui| match part {
+            Part::Sources => {
+                self.sources.ui(context, ui);
+                form::ui(context, &mut self.settings, &self.sources, &self.run, ui);
+                self.commands_ui(context, ui);
+                if self.run.refined.is_some() {
+                    save::ui(&mut self.saver, context, ui);
+                }
+            }
+            Part::Step => self.step_pane_ui(context, ui),
+        });
+    }
+
+    fn snapshot(&self, context: &ViewContext<'_>) -> Value {
+        let standing = self.standing_of_refined(context.session).map(|standing| match standing {
+            Standing::Fresh => "fresh",
+            Standing::InModel => "in_model",
+            Standing::Stale(_) => "stale",
+        });
+        let command = self
+            .run
+            .refined
+            .as_ref()
+            .map(|refined| refined.made.command_line(Question::Refine, refined.model_path.as_deref()));
+        json!({
+            "step": self.step.key(),
+            "logs": self.sources.snapshot(),
+            "running": self.run.running().map(|(question, _)| question.name()),
+            "problem": self.run.problem,
+            "residual": self.run.residual.as_ref().map(|residual| &residual.answer),
+            "refinement": self.found(),
+            "ticks": self.ticks,
+            "truth": self.run.truth,
+            "standing": standing,
+            "command": command,
+        })
+    }
+
+    fn command_line(&self, context: &ViewContext<'_>) -> Result<String, String> {
+        match form::why_not(&self.sources) {
+            Some(why_not) => Err(why_not.to_owned()),
+            None => Ok(self.made(context.session).command_line(Question::Refine, context.model_path)),
+        }
+    }
+
+    fn drain(&mut self) -> Vec<Said> {
+        self.drain_jobs().into_iter().chain(self.saver.drain().map(said)).collect()
+    }
+
+    fn focus_path(&mut self) -> bool {
+        self.sources.focus_path();
+        true
+    }
+
+    fn suggested_name(&self, purpose: FilePurpose) -> Option<String> {
+        match purpose {
+            FilePurpose::Refine(RefineFile::Save(saved_as)) => {
+                Some(format!("refined.{}", saved_as.extension()))
+            }
+            _ => None,
+        }
+    }
+
+    fn note_dialog_problem(&mut self, purpose: FilePurpose, problem: &str) {
+        match purpose {
+            FilePurpose::Refine(RefineFile::Log) => self.sources.dialog_problem = Some(problem.to_owned()),
+            FilePurpose::Refine(RefineFile::Save(_)) => self.saver.problem = Some(problem.to_owned()),
+            _ => {}
+        }
+    }
 }
 
 /// The panes under the steps.
@@ -500,7 +458,7 @@ fn use_ui(context: &ViewContext<'_>, standing: Option<Standing>, ticked: bool, u
         let button = egui::Button::new(text).fill(ui.visuals().selection.bg_fill);
         let help = "Add the selected effects and the corrected parameters to the model of this window";
         if ui.add_enabled(ready, button).on_hover_text(help).clicked() {
-            context.commands.send(Command::Refine(RefineCommand::Use));
+            context.commands.send(RefineCommand::Use);
         }
         match standing {
             Some(Standing::InModel) => {
@@ -513,4 +471,34 @@ fn use_ui(context: &ViewContext<'_>, standing: Option<Standing>, ticked: bool, u
             _ => {}
         }
     });
+}
+
+impl PageCommand for RefineCommand {
+    fn apply(&self, pages: &mut Pages, around: Surroundings<'_>) -> Result<Done, String> {
+        let page = &mut pages.refine;
+        let mut done = Done::default();
+        match self.clone() {
+            Self::Load { path, held_out } => {
+                // A path that means the same wherever the session is opened.
+                let path = std::path::absolute(&path).unwrap_or(path);
+                page.sources.load(&path, held_out, around.waker)?;
+                done.log = Some(path);
+            }
+            Self::Clear => page.sources.list.clear(),
+            Self::Remove(id) => page.sources.remove(id),
+            Self::HoldOut(id, held_out) => page.sources.hold_out(id, held_out),
+            Self::Start(question) => page.start(question, around)?,
+            Self::Cancel => page.run.cancel(),
+            Self::Use => {
+                done.said = Some(page.put_into(around.session)?);
+                done.step = "use effects in model";
+            }
+            Self::Simulate(scenario) => {
+                pages.experiments.choose(scenario);
+                done.tab = Some(Tab::Experiments);
+            }
+            Self::Save { saved_as, path, replace } => page.save(saved_as, path, replace, &around)?,
+        }
+        Ok(done)
+    }
 }

@@ -52,7 +52,7 @@ const WORDS: Words<SavedAs> = Words {
 pub(super) fn ui(form: &mut SaveForm<SavedAs>, context: &ViewContext<'_>, ui: &mut Ui) {
     let asked = form.ui(&WORDS, Layout::Column, |_, _| {}, ui);
     if let Some((saved_as, path, replace)) = asked.save {
-        context.commands.send(Command::Refine(RefineCommand::Save { saved_as, path, replace }));
+        context.commands.send(RefineCommand::Save { saved_as, path, replace });
     }
     if let Some(saved_as) = asked.dialog {
         let purpose = FilePurpose::Refine(RefineFile::Save(saved_as));

@@ -211,7 +211,7 @@ impl Sources {
         let typed = !path.as_os_str().is_empty();
         let add = |held_out| {
             let path = path.clone();
-            context.commands.send(Command::Refine(RefineCommand::Load { path, held_out }));
+            context.commands.send(RefineCommand::Load { path, held_out });
         };
         let fits = ui.add_enabled(typed, egui::Button::new("Add log"));
         if fits.on_hover_text("Used to refine the model").clicked() || (entered && typed) {
@@ -234,7 +234,7 @@ fn recent_ui(context: &ViewContext<'_>, ui: &mut Ui) {
     for path in &context.recent.logs {
         if ui.button(path.display().to_string()).clicked() {
             let path = path.clone();
-            context.commands.send(Command::Refine(RefineCommand::Load { path, held_out: false }));
+            context.commands.send(RefineCommand::Load { path, held_out: false });
             ui.close();
         }
     }
@@ -244,7 +244,7 @@ impl Source {
     fn ui(&self, context: &ViewContext<'_>, ui: &mut Ui) {
         let path = self.path.display().to_string();
         let name = self.path.file_name().map_or_else(|| path.clone(), |name| name.to_string_lossy().into());
-        let send = |command| context.commands.send(Command::Refine(command));
+        let send = |command| context.commands.send(command);
         ui.horizontal(|ui| {
             let right = egui::Layout::right_to_left(egui::Align::Center);
             ui.with_layout(right, |ui| {

@@ -8,7 +8,7 @@ use super::link::{Link, sentence};
 use super::transfer::apply_ui;
 use crate::command::{Command, Commands, Source};
 use crate::context::ViewContext;
-use crate::tab::Tab;
+use crate::pages::Tab;
 use crate::theme::palette;
 use crate::widgets::plain;
 

@@ -21,10 +21,13 @@ use egui::{Button, Frame, Label, Margin, RichText, ScrollArea, Sense, Ui, UiBuil
 use flqr_core::control::drive::Stage;
 use flqr_core::device::{Connection, Interfaces, SessionOptions, Source as DeviceSource, Update};
 use flqr_core::model::LinkSettings;
+use serde_json::Value;
 
 use crate::command::{Command, FilePurpose, Source};
 use crate::context::ViewContext;
 use crate::job::{Job, Outcome, Waker};
+use crate::messages::Said;
+use crate::pages::Page;
 use crate::panes::{Pane, panes_ui};
 use crate::recent::Recent;
 use crate::theme::palette;
@@ -58,19 +61,6 @@ impl RobotTab {
     pub(crate) fn look(&mut self, link: &Link, waker: &Waker) {
         let devices = Arc::clone(link.devices());
         self.looking = Job::start("list-interfaces", waker, move |_| devices.interfaces()).ok();
-    }
-
-    /// Takes the result of the search.
-    pub(crate) fn drain(&mut self) {
-        let Some(job) = &mut self.looking else { return };
-        match job.poll().1 {
-            Outcome::Running => return,
-            Outcome::Done(found) => self.found = Some(found),
-            Outcome::Broken => {
-                self.found = Some(Interfaces { can: Vec::new(), serial: Vec::new(), advice: Vec::new() });
-            }
-        }
-        self.looking = None;
     }
 
     /// Takes the frames and events of an update.
@@ -125,34 +115,6 @@ impl RobotTab {
     pub(crate) fn note_recording_path(&mut self, path: &Path) {
         self.record.path = path.display().to_string();
         self.record.dialog_problem = None;
-    }
-
-    pub(crate) fn note_dialog_problem(&mut self, purpose: FilePurpose, problem: &str) {
-        match purpose {
-            FilePurpose::OpenReplay => self.form.dialog_problem = Some(problem.to_owned()),
-            FilePurpose::SaveRecording => self.record.dialog_problem = Some(problem.to_owned()),
-            _ => {}
-        }
-    }
-
-    /// Name that the file dialog suggests.
-    pub(crate) fn suggested_name(&self) -> String {
-        let name = Path::new(&self.record.path).file_name();
-        name.map_or_else(|| "robot.csv".to_owned(), |name| name.to_string_lossy().into_owned())
-    }
-
-    /// Draws the page; returns whether STOP was pressed.
-    pub(crate) fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) -> bool {
-        let panes = [
-            Pane::left(Part::Connection, "Connection", 280.0, 250.0..=420.0),
-            Pane::middle(Part::Robot, "Robot", 340.0),
-        ];
-        let mut stop = false;
-        panes_ui(ui, "robot", &panes, |part, ui| match part {
-            Part::Connection => stop |= self.side_ui(context, ui),
-            Part::Robot => self.middle_ui(context, ui),
-        });
-        stop
     }
 
     fn side_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) -> bool {
@@ -227,6 +189,58 @@ impl RobotTab {
             ui.set_clip_rect(right.intersect(ui.clip_rect()));
             self.events.ui(ui);
         });
+    }
+}
+
+impl Page for RobotTab {
+    fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
+        let panes = [
+            Pane::left(Part::Connection, "Connection", 280.0, 250.0..=420.0),
+            Pane::middle(Part::Robot, "Robot", 340.0),
+        ];
+        let mut stop = false;
+        panes_ui(ui, "robot", &panes, |part, ui| match part {
+            Part::Connection => stop |= self.side_ui(context, ui),
+            Part::Robot => self.middle_ui(context, ui),
+        });
+        if stop {
+            context.commands.send(Command::Stop);
+        }
+    }
+
+    fn snapshot(&self, context: &ViewContext<'_>) -> Value {
+        self.to_value(context.link)
+    }
+
+    fn command_line(&self, context: &ViewContext<'_>) -> Result<String, String> {
+        let design = (context.session, context.designer);
+        self.form.command_line(context.source, design, context.session.controller, context.model_path)
+    }
+
+    fn drain(&mut self) -> Vec<Said> {
+        let found = match self.looking.as_mut().map(|job| job.poll().1) {
+            None | Some(Outcome::Running) => return Vec::new(),
+            Some(Outcome::Done(found)) => found,
+            Some(Outcome::Broken) => Interfaces { can: Vec::new(), serial: Vec::new(), advice: Vec::new() },
+        };
+        (self.found, self.looking) = (Some(found), None);
+        Vec::new()
+    }
+
+    fn suggested_name(&self, purpose: FilePurpose) -> Option<String> {
+        if purpose != FilePurpose::SaveRecording {
+            return None;
+        }
+        let name = Path::new(&self.record.path).file_name();
+        Some(name.map_or_else(|| "robot.csv".to_owned(), |name| name.to_string_lossy().into_owned()))
+    }
+
+    fn note_dialog_problem(&mut self, purpose: FilePurpose, problem: &str) {
+        match purpose {
+            FilePurpose::OpenReplay => self.form.dialog_problem = Some(problem.to_owned()),
+            FilePurpose::SaveRecording => self.record.dialog_problem = Some(problem.to_owned()),
+            _ => {}
+        }
     }
 }
 

@@ -8,7 +8,7 @@ use super::{Link, RobotTab};
 
 impl RobotTab {
     /// Returns the state of the page.
-    pub(crate) fn snapshot(&self, link: &Link) -> Value {
+    pub(super) fn to_value(&self, link: &Link) -> Value {
         let status = link.status.as_ref();
         let last_event = self.events.last().map(|event| &event.text);
         json!({

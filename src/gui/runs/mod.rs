@@ -20,6 +20,8 @@ use flqr_core::model::Model;
 
 use crate::context::ViewContext;
 use crate::job::Waker;
+use crate::messages::{Said, Severity};
+use crate::pages::{Done, Page, PageCommand, Pages, Surroundings, Tab};
 use crate::panes::{Pane, panes_ui};
 use crate::widgets::empty_page_ui;
 use changes::Changes;
@@ -57,28 +59,6 @@ impl RunsTab {
         if let Some(row) = self.recording.note(now, source, model) {
             self.note(row);
         }
-    }
-
-    /// Takes in curves that have been read; a sentence for each recording that could not be.
-    pub(crate) fn drain(&mut self) -> Vec<String> {
-        let mut problems = Vec::new();
-        for mut reading in std::mem::take(&mut self.reading) {
-            match reading.drain() {
-                None => self.reading.push(reading),
-                // The number may be another run's by now, of a session that was opened meanwhile.
-                Some(_) if !self.ledger.has(&reading.row) => {}
-                Some(Ok(series)) => self.ledger.set_series(reading.row.number, series),
-                Some(Err(problem)) => {
-                    self.ticked.remove(&reading.row.number);
-                    problems.push(format!("Run {} cannot be drawn: {problem}.", reading.row.number));
-                }
-            }
-        }
-        let (ledger, reading) = (&self.ledger, &self.reading);
-        let is_read = |number| reading.iter().any(|reading| reading.row.number == number);
-        let is_drawn = |number| ledger.row(number).is_some_and(|row| row.series.is_some());
-        self.ticked.retain(|number| is_drawn(*number) || is_read(*number));
-        problems
     }
 
     fn read_curves(&mut self, number: u64, waker: &Waker) -> Option<String> {
@@ -123,36 +103,6 @@ impl RunsTab {
         self.ledger.row(number).ok_or("This run does not exist.")?.command_line()
     }
 
-    /// Changes the ledger; a sentence where there is something to say.
-    pub(crate) fn apply(&mut self, command: RunsCommand, waker: &Waker) -> Option<String> {
-        match command {
-            RunsCommand::ReadCurves(number) => self.read_curves(number, waker),
-            RunsCommand::Delete(numbers) => {
-                let deleted = self.ledger.delete(&numbers);
-                self.ticked.retain(|number| !numbers.contains(number));
-                let text = |deleted| format!("Deleted {}. Undo delete restores it.", listed(deleted));
-                (!deleted.is_empty()).then(|| text(deleted))
-            }
-            RunsCommand::FocusRows => {
-                self.table.focus_first = true;
-                None
-            }
-            RunsCommand::OverlayLast => self.overlay_last(waker),
-            RunsCommand::UntickAll => {
-                self.ticked.clear();
-                None
-            }
-            RunsCommand::UndoDelete => {
-                let back = self.ledger.undo_delete()?;
-                Some(format!("{} is back.", listed(back)))
-            }
-            RunsCommand::SetNote(number, note) => {
-                self.ledger.row_mut(number)?.note = note;
-                None
-            }
-        }
-    }
-
     /// All rows.
     pub(crate) fn ledger(&self) -> &Ledger {
         &self.ledger
@@ -174,50 +124,10 @@ impl RunsTab {
         self.reading.clear();
         before
     }
+}
 
-    /// The command that makes the ticked row again, or the newest where none is ticked.
-    ///
-    /// # Errors
-    /// A sentence says why there is none.
-    pub(crate) fn command_line(&self) -> Result<String, String> {
-        let run = match self.ticked.len() {
-            0 => self.ledger.rows().last().map(|run| &**run),
-            1 => self.ticked.first().and_then(|number| self.ledger.row(*number)),
-            _ => return Err("Several rows are selected. Select one to copy its command.".to_owned()),
-        };
-        run.ok_or("There is no run yet.")?.command_line()
-    }
-
-    /// State of the page for `--state-out`.
-    pub(crate) fn snapshot(&self) -> serde_json::Value {
-        let rows: Vec<_> = self
-            .ledger
-            .rows()
-            .iter()
-            .map(|run| {
-                serde_json::json!({
-                    "number": run.number,
-                    "kind": run.kind,
-                    "title": run.title,
-                    "seed": run.seed,
-                    "sources": run.sources,
-                    "weights": run.weights(),
-                    "result": run.result,
-                    "note": run.note,
-                    "command": run.command,
-                    "values": run.series.as_ref().map_or(0, |series| series.size()),
-                })
-            })
-            .collect();
-        serde_json::json!({
-            "rows": rows,
-            "shown": self.ticked,
-            "shifts_s": self.overlay.shifts_s(),
-            "can_undo_delete": self.ledger.has_deleted(),
-        })
-    }
-
-    pub(crate) fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
+impl Page for RunsTab {
+    fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
         let frame = Frame::central_panel(ui.style()).inner_margin(Margin::symmetric(10, 6));
         if self.ledger.rows().is_empty() && !self.ledger.has_deleted() {
             let hint = "Every experiment, fit, refinement and recording is listed here, with a number that its exports carry.";
@@ -245,6 +155,65 @@ impl RunsTab {
             Part::Changes => self.changes.ui(&self.ledger, &self.ticked, ui),
         });
     }
+
+    fn snapshot(&self, _: &ViewContext<'_>) -> serde_json::Value {
+        let rows: Vec<_> = self
+            .ledger
+            .rows()
+            .iter()
+            .map(|run| {
+                serde_json::json!({
+                    "number": run.number,
+                    "kind": run.kind,
+                    "title": run.title,
+                    "seed": run.seed,
+                    "sources": run.sources,
+                    "weights": run.weights(),
+                    "result": run.result,
+                    "note": run.note,
+                    "command": run.command,
+                    "values": run.series.as_ref().map_or(0, |series| series.size()),
+                })
+            })
+            .collect();
+        serde_json::json!({
+            "rows": rows,
+            "shown": self.ticked,
+            "shifts_s": self.overlay.shifts_s(),
+            "can_undo_delete": self.ledger.has_deleted(),
+        })
+    }
+
+    fn command_line(&self, _: &ViewContext<'_>) -> Result<String, String> {
+        let run = match self.ticked.len() {
+            0 => self.ledger.rows().last().map(|run| &**run),
+            1 => self.ticked.first().and_then(|number| self.ledger.row(*number)),
+            _ => return Err("Several rows are selected. Select one to copy its command.".to_owned()),
+        };
+        run.ok_or("There is no run yet.")?.command_line()
+    }
+
+    fn drain(&mut self) -> Vec<Said> {
+        let mut problems = Vec::new();
+        for mut reading in std::mem::take(&mut self.reading) {
+            match reading.drain() {
+                None => self.reading.push(reading),
+                // The number may be another run's by now, of a session that was opened meanwhile.
+                Some(_) if !self.ledger.has(&reading.row) => {}
+                Some(Ok(series)) => self.ledger.set_series(reading.row.number, series),
+                Some(Err(problem)) => {
+                    self.ticked.remove(&reading.row.number);
+                    let text = format!("Run {} cannot be drawn: {problem}.", reading.row.number);
+                    problems.push((Severity::Error, text));
+                }
+            }
+        }
+        let (ledger, reading) = (&self.ledger, &self.reading);
+        let is_read = |number| reading.iter().any(|reading| reading.row.number == number);
+        let is_drawn = |number| ledger.row(number).is_some_and(|row| row.series.is_some());
+        self.ticked.retain(|number| is_drawn(*number) || is_read(*number));
+        problems
+    }
 }
 
 /// The panes under the table.
@@ -257,4 +226,37 @@ enum Part {
 fn listed(numbers: Vec<u64>) -> String {
     let numbers: Vec<String> = numbers.into_iter().map(|number| number.to_string()).collect();
     format!("{} {}", if numbers.len() == 1 { "run" } else { "runs" }, numbers.join(", "))
+}
+
+impl PageCommand for RunsCommand {
+    fn apply(&self, pages: &mut Pages, around: Surroundings<'_>) -> Result<Done, String> {
+        let page = &mut pages.runs;
+        let tab = matches!(self, Self::OverlayLast | Self::FocusRows).then_some(Tab::Runs);
+        let said = match self {
+            Self::ReadCurves(number) => page.read_curves(*number, around.waker),
+            Self::Delete(numbers) => {
+                let deleted = page.ledger.delete(numbers);
+                page.ticked.retain(|number| !numbers.contains(number));
+                let text = |deleted| format!("Deleted {}. Undo delete restores it.", listed(deleted));
+                (!deleted.is_empty()).then(|| text(deleted))
+            }
+            Self::FocusRows => {
+                page.table.focus_first = true;
+                None
+            }
+            Self::OverlayLast => page.overlay_last(around.waker),
+            Self::UntickAll => {
+                page.ticked.clear();
+                None
+            }
+            Self::UndoDelete => page.ledger.undo_delete().map(|back| format!("{} is back.", listed(back))),
+            Self::SetNote(number, note) => {
+                if let Some(row) = page.ledger.row_mut(*number) {
+                    row.note.clone_from(note);
+                }
+                None
+            }
+        };
+        Ok(Done { said, tab, ..Done::default() })
+    }
 }

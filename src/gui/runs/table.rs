@@ -113,15 +113,15 @@ impl RunTable {
         }
         let undo = ui.add_enabled(can_undo, Button::new("Undo delete"));
         if undo.on_hover_text("Restore the rows deleted last").clicked() {
-            context.commands.send(Command::Runs(RunsCommand::UndoDelete));
+            context.commands.send(RunsCommand::UndoDelete);
         }
         let delete = ui.add_enabled(!ticked.is_empty(), Button::new("Delete selected"));
         if delete.on_hover_text("Delete the selected rows").clicked() {
-            context.commands.send(Command::Runs(RunsCommand::Delete(ticked.iter().copied().collect())));
+            context.commands.send(RunsCommand::Delete(ticked.iter().copied().collect()));
         }
         let none = ui.add_enabled(!ticked.is_empty(), Button::new("Clear selection"));
         if none.on_hover_text("Clear the selection").clicked() {
-            context.commands.send(Command::Runs(RunsCommand::UntickAll));
+            context.commands.send(RunsCommand::UntickAll);
         }
         let field = TextEdit::singleline(&mut self.filter).hint_text("filter").desired_width(140.0);
         ui.add(field).accessible_name("filter of runs").on_hover_text("Rows that contain all of these words");
@@ -178,7 +178,7 @@ impl RunTable {
         if field.lost_focus()
             && let Some((number, text)) = self.note.take_if(|(number, _)| *number == run.number)
         {
-            context.commands.send(Command::Runs(RunsCommand::SetNote(number, text)));
+            context.commands.send(RunsCommand::SetNote(number, text));
         }
     }
 }
@@ -188,7 +188,7 @@ fn number_ui(context: &ViewContext<'_>, number: u64, ui: &mut Ui) {
     let delete = ui.add(Button::new("×").small().frame(false));
     let delete = delete.accessible_name(format!("delete run {number}"));
     if delete.on_hover_text("Delete this row; Undo delete restores it").clicked() {
-        context.commands.send(Command::Runs(RunsCommand::Delete(vec![number])));
+        context.commands.send(RunsCommand::Delete(vec![number]));
     }
 }
 
@@ -215,7 +215,7 @@ fn tick_ui(context: &ViewContext<'_>, run: &Run, ticked: &mut BTreeSet<u64>, ui:
         } else if drawn {
             ticked.insert(number);
         } else {
-            context.commands.send(Command::Runs(RunsCommand::ReadCurves(number)));
+            context.commands.send(RunsCommand::ReadCurves(number));
         }
     }
     if !tick && !drawn && run.file().is_none() {

@@ -17,14 +17,15 @@ mod weights;
 use std::path::Path;
 
 use egui::{CentralPanel, Frame, Margin, Panel, ScrollArea, Ui};
+use serde_json::{Value, json};
 
 use crate::command::{Command, FilePurpose, Source};
+use crate::command_line;
 use crate::context::ViewContext;
-use crate::design::Designer;
+use crate::pages::{Page, Tab};
 use crate::panes::{Pane, panes_ui};
 use crate::robot::pending_ui;
 use crate::session::Session;
-use crate::tab::Tab;
 use crate::widgets::hint_ui;
 use live_plots::LivePlots;
 use model::ModelFiles;
@@ -77,28 +78,12 @@ impl TuneTab {
         self.weights.focus_first = true;
     }
 
-    pub(crate) fn note_dialog_problem(&mut self, purpose: FilePurpose, problem: &str) {
-        if matches!(purpose, FilePurpose::OpenModel | FilePurpose::SaveModel) {
-            self.note_file_problem(problem);
-        }
-    }
-
     pub(crate) fn note_file_problem(&mut self, problem: &str) {
         self.files.problem = Some(problem.to_owned());
     }
 
     pub(crate) fn note_saved(&mut self, path: &Path) {
         self.files = ModelFiles::new(Some(path));
-    }
-
-    /// State of a design for `--state-out`.
-    pub(crate) fn snapshot(&self, designer: &Designer) -> serde_json::Value {
-        serde_json::json!({
-            "design": designer.active.name(),
-            "other_design": designer.reference.map(|designed| designed.weights.q.diagonal().as_slice().to_vec()),
-            "margins": designer.in_force.as_ref().map(margins::snapshot),
-            "trials": self.trials.snapshot(),
-        })
     }
 
     /// The left side: what runs is always in view, and below it the weights and what follows from them.
@@ -118,7 +103,35 @@ impl TuneTab {
         });
     }
 
-    pub(crate) fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
+    fn model_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
+        self.files.ui(context, ui);
+        self.parameters.ui(context, ui);
+        effects::ui(context, ui);
+    }
+
+    /// The live robot above what the design predicts.
+    fn both_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
+        let frame = Frame::NONE.inner_margin(Margin::symmetric(0, 6));
+        Panel::bottom("predicted")
+            .frame(frame)
+            .resizable(true)
+            .default_size(240.0)
+            .size_range(160.0..=420.0)
+            .show(ui, |ui| self.predicted.ui(context, &mut self.trials, ui));
+        CentralPanel::default().frame(Frame::NONE).show(ui, |ui| self.plots_ui(context, ui));
+    }
+
+    fn plots_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
+        // What a session has brought stays in view after its end.
+        let shown = context.source == Source::Simulated
+            || context.link.is_open()
+            || !context.history.time_s().is_empty();
+        if shown { self.plots.ui(context, ui) } else { not_connected_ui(context, ui) }
+    }
+}
+
+impl Page for TuneTab {
+    fn ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
         let model = Pane::right(Part::Model, "Model", 252.0, 220.0..=420.0);
         if context.session.robot().is_none() {
             let panes = [Pane::middle(Part::Plots, "Robot", 300.0), model];
@@ -148,30 +161,23 @@ impl TuneTab {
         }
     }
 
-    fn model_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
-        self.files.ui(context, ui);
-        self.parameters.ui(context, ui);
-        effects::ui(context, ui);
+    fn snapshot(&self, context: &ViewContext<'_>) -> Value {
+        json!({
+            "design": context.designer.active.name(),
+            "other_design": context.designer.reference.map(|designed| designed.weights.q.diagonal().as_slice().to_vec()),
+            "margins": context.designer.in_force.as_ref().map(margins::snapshot),
+            "trials": self.trials.snapshot(),
+        })
     }
 
-    /// The live robot above what the design predicts.
-    fn both_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
-        let frame = Frame::NONE.inner_margin(Margin::symmetric(0, 6));
-        Panel::bottom("predicted")
-            .frame(frame)
-            .resizable(true)
-            .default_size(240.0)
-            .size_range(160.0..=420.0)
-            .show(ui, |ui| self.predicted.ui(context, &mut self.trials, ui));
-        CentralPanel::default().frame(Frame::NONE).show(ui, |ui| self.plots_ui(context, ui));
+    fn command_line(&self, context: &ViewContext<'_>) -> Result<String, String> {
+        Ok(command_line::gains(context.model_path))
     }
 
-    fn plots_ui(&mut self, context: &ViewContext<'_>, ui: &mut Ui) {
-        // What a session has brought stays in view after its end.
-        let shown = context.source == Source::Simulated
-            || context.link.is_open()
-            || !context.history.time_s().is_empty();
-        if shown { self.plots.ui(context, ui) } else { not_connected_ui(context, ui) }
+    fn note_dialog_problem(&mut self, purpose: FilePurpose, problem: &str) {
+        if matches!(purpose, FilePurpose::OpenModel | FilePurpose::SaveModel) {
+            self.note_file_problem(problem);
+        }
     }
 }
 
