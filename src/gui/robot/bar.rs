@@ -110,20 +110,11 @@ pub(super) fn stopped(link: &Link, reason: &StopReason) -> String {
     remedy(reason).map_or_else(|| text.clone(), |remedy| format!("{text} {remedy}"))
 }
 
-/// The remedy, where the reason itself does not say it.
+/// Returns the remedy of a stop whose reason does not name it.
 fn remedy(reason: &StopReason) -> Option<&'static str> {
     Some(match reason {
         StopReason::Requested => "Release it to arm again.",
         StopReason::Done => "Its recording can be fitted on the Friction tab.",
-        StopReason::Tilt { .. } => {
-            "Set the robot upright. Check the signs of IMU and motors if it fell immediately."
-        }
-        StopReason::Speed { .. } | StopReason::Distance { .. } => {
-            "Put it back, or raise the limit in [safety] of the model."
-        }
-        StopReason::MotorSpeed { .. } => {
-            "Put the wheels on the ground, or raise motor_speed_rad_s in [safety]."
-        }
         StopReason::MotorError { .. } => "Remove the cause, then power-cycle the motor.",
         StopReason::NotFinite => "Check the raw frames and the scales in [link] of the model.",
         _ => return None,
