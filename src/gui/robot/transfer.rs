@@ -1,6 +1,6 @@
 //! Transfer of gains from the design to the connected robot: manually, or as they change.
 
-use egui::{Button, Frame, Grid, Margin, RichText, Stroke, Ui};
+use egui::{Button, Frame, Grid, Id, Margin, RichText, Stroke, Ui};
 use flqr_core::control::{
     BalanceController,
     gate::{self, GainChange, Verdict},
@@ -168,13 +168,31 @@ pub(crate) fn pending_ui(context: &ViewContext<'_>, ui: &mut Ui) {
     ui.add_space(4.0);
 }
 
+/// Time after it appears for which the button that applies the design takes no click, s: it pushes what is below it away,
+/// and the second half of a double click must not reach a driven robot.
+const SETTLES_S: f64 = 0.6;
+
+/// Returns whether the button appeared just now.
+fn is_new(ui: &Ui) -> bool {
+    let (now_s, frame) = (ui.input(|input| input.time), ui.ctx().cumulative_frame_nr());
+    ui.data_mut(|data| {
+        let shown = data.get_temp_mut_or(Id::unique("apply to robot"), (now_s, frame));
+        if shown.1 + 1 < frame {
+            shown.0 = now_s;
+        }
+        shown.1 = frame;
+        now_s - shown.0 < SETTLES_S
+    })
+}
+
 /// Draws the button that applies the design.
 pub(super) fn apply_ui(link: &Link, commands: &Commands, ui: &mut Ui) {
     let Some(pending) = link.transfer.pending() else { return };
     let refusal = pending.refusal();
     let button = ui.add_enabled(refusal.is_none(), Button::new(RichText::new("Apply to robot").strong()));
     let button = button.on_hover_text("The gains are blended over 0.2 s");
-    if button.on_disabled_hover_text(refusal.unwrap_or_default()).clicked() {
+    let is_clicked = button.on_disabled_hover_text(refusal.unwrap_or_default()).clicked();
+    if !is_new(ui) && is_clicked {
         commands.send(Command::ApplyGains);
     }
 }
@@ -217,5 +235,27 @@ pub(crate) fn change_rows_ui(changes: &[GainChange], ui: &mut Ui) {
             self::change(change.old, change.new)
         }));
         ui.end_row();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use egui::{Context, RawInput};
+
+    use super::*;
+
+    #[test]
+    fn a_button_takes_no_click_just_after_it_appeared() {
+        let context = Context::default();
+        let at = |time: f64, is_shown: bool| {
+            let mut found = None;
+            let input = RawInput { time: Some(time), ..RawInput::default() };
+            let mut output = context.run_ui(input, |ui| found = is_shown.then(|| is_new(ui)));
+            output.textures_delta.clear();
+            found
+        };
+        assert_eq!([at(1.0, true), at(1.4, true), at(1.7, true)], [Some(true), Some(true), Some(false)]);
+        assert_eq!([at(1.8, false), at(1.9, false), at(2.0, true)], [None, None, Some(true)]);
+        assert_eq!([at(2.3, true), at(2.7, true)], [Some(true), Some(false)]);
     }
 }
