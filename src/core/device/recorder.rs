@@ -239,16 +239,14 @@ impl Shared {
         let lost = self.lost();
         status.rows_lost = lost[ROWS];
         let file = status.file.display();
-        let counts = [(ROWS, "row"), (FRAMES, "frame"), (OTHERS, "bench row or event")];
-        let parts: Vec<String> = { counts.into_iter() }
-            .filter(|(kind, _)| lost[*kind] > 0)
-            .map(|(kind, name)| match lost[kind] {
-                1 => format!("1 {name}"),
-                count => format!(
-                    "{count} {}",
-                    name.replace("row", "rows").replace("frame", "frames").replace("event", "events")
-                ),
-            })
+        let names = [
+            (ROWS, "row", "rows"),
+            (FRAMES, "frame", "frames"),
+            (OTHERS, "bench row or event", "bench rows or events"),
+        ];
+        let parts: Vec<String> = { names.into_iter() }
+            .filter(|(kind, ..)| lost[*kind] > 0)
+            .map(|(kind, one, many)| format!("{} {}", lost[kind], if lost[kind] == 1 { one } else { many }))
             .collect();
         if parts.is_empty() {
             return status;

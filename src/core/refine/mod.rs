@@ -78,7 +78,7 @@ const SEARCH: f64 = 0.75;
 /// Most effects that are left out of a search because predictions are worse with them.
 const MOST_BANNED: usize = 3;
 
-/// Told the fraction of the work that is done; may end it.
+/// Receives the fraction of the work that is done, and may cancel it.
 type Watch<'a> = &'a mut dyn FnMut(f64) -> ControlFlow<()>;
 
 fn report(watch: Watch<'_>, share: f64) -> Result<(), RefineError> {
@@ -120,7 +120,7 @@ pub fn residual(
 /// Finds what a model lacks, and adds it. Without `held_out` logs the last third of each log is held out, after a gap
 /// of 0.5 s.
 ///
-/// `watch` is told the fraction of the work that is done.
+/// `watch` receives the fraction of the work that is done.
 ///
 /// # Errors
 /// No log, logs of several kinds, a log of another machine or without its columns, a name in `estimate` that is no
@@ -144,8 +144,8 @@ pub fn refine(
     of_cells.extend(cleaning::without_duplicates(&mut logs));
     of_cells.extend(cleaning::without_duplicates(&mut held_out));
     let (logs, held_out) = (logs.as_slice(), held_out.as_slice());
-    let (told, rows) = if held_out.is_empty() { (logs, Rows::LastThird) } else { (held_out, Rows::All) };
-    let predicted = |model: &Model| predictions(model, told, rows, options.motor, options.seed);
+    let (assessed, rows) = if held_out.is_empty() { (logs, Rows::LastThird) } else { (held_out, Rows::All) };
+    let predicted = |model: &Model| predictions(model, assessed, rows, options.motor, options.seed);
     let of_motor = (kind != LogKind::Robot).then_some(options.motor);
     let mut banned = Vec::new();
     let mut found = loop {

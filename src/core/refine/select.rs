@@ -356,7 +356,7 @@ fn fit(gram: &DMatrix<f64>, members: &[Member], noise: f64) -> Option<Vec<f64>> 
     let target = gram.nrows() - 1;
     let mut values = vec![0.0; members.len()];
     let mut free: Vec<usize> = (0..members.len()).collect();
-    // A member is released once: rounding alone could hold and release two of them in turn for ever.
+    // A member is released once: rounding alone could hold and release two of them in turn endlessly.
     let mut released = vec![false; members.len()];
     loop {
         let size = free.len();

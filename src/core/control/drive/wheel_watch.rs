@@ -151,8 +151,18 @@ impl WheelWatch {
         acted_nm: [f64; 2],
         limits: &SafetyLimits,
     ) {
+        self.hear_shafts(motors, 0.0, acted_nm, limits);
+    }
+
+    fn hear_shafts(
+        &mut self,
+        motors: &[MotorState; 2],
+        pitch_rad: f64,
+        acted_nm: [f64; 2],
+        limits: &SafetyLimits,
+    ) {
         for ((shaft, state), torque_nm) in self.shafts.iter_mut().zip(motors).zip(acted_nm) {
-            shaft.hear(state, 0.0, torque_nm, limits);
+            shaft.hear(state, pitch_rad, torque_nm, limits);
         }
     }
 
@@ -164,9 +174,7 @@ impl WheelWatch {
         acted_nm: [f64; 2],
         limits: &SafetyLimits,
     ) {
-        for ((shaft, state), torque_nm) in self.shafts.iter_mut().zip(motors).zip(acted_nm) {
-            shaft.hear(state, imu.pitch_rad, torque_nm, limits);
-        }
+        self.hear_shafts(motors, imu.pitch_rad, acted_nm, limits);
         if self.shafts.iter().any(|shaft| !shaft.stands) {
             self.swings = Swings::default();
         }

@@ -51,8 +51,8 @@ const LEAST_HELD_OUT_S: f64 = 0.2;
 /// Runs of equal values that are usual, from which on a column is held.
 const HELD_ROWS: usize = 3;
 
-fn finding(severity: Severity, column: &str, problem: String, mend: impl Into<String>) -> HealthFinding {
-    HealthFinding::new(severity, column, problem, mend.into())
+fn finding(severity: Severity, column: &str, problem: String, remedy: impl Into<String>) -> HealthFinding {
+    HealthFinding::new(severity, column, problem, remedy.into())
 }
 
 /// Findings about logs, those that are held out among them.
@@ -101,8 +101,8 @@ pub(super) fn check<'a>(logs: impl IntoIterator<Item = &'a Log>, declared: &Decl
                 "the value stays the same from {from_s:.1} to {to_s:.1} s while {goes_on} goes on as before: the sensor is \
                  dead there"
             );
-            let mend = "check the sensor and its cable, or cut the log to the part before";
-            finding(Severity::Error, name, problem, mend)
+            let remedy = "check the sensor and its cable, or cut the log to the part before";
+            finding(Severity::Error, name, problem, remedy)
         };
         found.extend(dead::position(positions, efforts).map(|rows| dead(names.position, rows, "the effort")));
         // A load swings without a torque.
@@ -139,8 +139,8 @@ pub(super) fn not_driven(declared: &Declared) -> HealthFinding {
         "the motion is so even that noise accelerates the axis as much as the logged effort does: errors \
                    of declared numbers and of the effort's way to the axis are not looked for"
             .to_owned();
-    let mend = "record efforts of many frequencies to have them told";
-    finding(Severity::Warning, declared.names().effort, problem, mend)
+    let remedy = "excite the axis with efforts of many frequencies";
+    finding(Severity::Warning, declared.names().effort, problem, remedy)
 }
 
 /// The finding that the motion does not tell the parameters apart.
@@ -176,20 +176,20 @@ pub(super) fn check_rows(
             rows.kernel.cutoff_hz,
             100.0 * rows.rest_share
         );
-        let mend = "record at least ten seconds of motion in both directions";
-        found.push(finding(Severity::Error, names.position, problem, mend));
+        let remedy = "record at least ten seconds of motion in both directions";
+        found.push(finding(Severity::Error, names.position, problem, remedy));
     } else if !rows.moves() {
         let problem = "the axis hardly moves: what there is may be noise of the position".to_owned();
-        let mend = "record motion at several speeds in both directions";
-        found.push(finding(Severity::Error, names.position, problem, mend));
+        let remedy = "record motion at several speeds in both directions";
+        found.push(finding(Severity::Error, names.position, problem, remedy));
     }
     if rows.agreement.is_some_and(|agreement| agreement.incoherent >= INCOHERENT) {
         let problem = format!(
             "the speed does not follow the change of `{}`: a dead or mistaken sensor",
             names.position
         );
-        let mend = "nothing has to be done: the speed is taken from the position";
-        found.push(finding(Severity::Warning, names.speed, problem, mend));
+        let remedy = "nothing has to be done: the speed is taken from the position";
+        found.push(finding(Severity::Warning, names.speed, problem, remedy));
     }
     if let Some(speed) = rows.agreement.filter(|agreement| agreement.incoherent < INCOHERENT) {
         let map = |factor: f64| format!("read it with --map {0}={0}*{factor:.4}", names.speed);
@@ -205,8 +205,8 @@ pub(super) fn check_rows(
                 1e3 * speed.lag_s,
                 names.position
             );
-            let mend = "nothing has to be done: the speed is taken from the position";
-            found.push(finding(Severity::Warning, names.speed, problem, mend));
+            let remedy = "nothing has to be done: the speed is taken from the position";
+            found.push(finding(Severity::Warning, names.speed, problem, remedy));
         }
     }
     found
@@ -222,8 +222,8 @@ pub(super) fn check_held_out(declared: &Declared, rows: &Rows, held_out: usize) 
         "the axis moves for only {seconds:.1} s of what is held out and {LEAST_HELD_OUT_S} s are needed: on them nothing \
          can be checked"
     );
-    let mend = "hold out a log in which the axis moves for some seconds";
-    Some(finding(Severity::Error, declared.names().position, problem, mend))
+    let remedy = "hold out a log in which the axis moves for some seconds";
+    Some(finding(Severity::Error, declared.names().position, problem, remedy))
 }
 
 /// The finding that rows go beyond the speeds that friction was told from.
@@ -239,8 +239,8 @@ pub(super) fn beyond(declared: &Declared, told_from: [f64; 2], seen: [f64; 2]) -
             seen[0], seen[1], told_from[0], told_from[1]
         )
     };
-    let mend = "let these logs tell friction (--estimate all), or declare what was measured at such speeds";
-    (faster || slower).then(|| finding(Severity::Warning, declared.names().position, problem(), mend))
+    let remedy = "let these logs tell friction (--estimate all), or declare what was measured at such speeds";
+    (faster || slower).then(|| finding(Severity::Warning, declared.names().position, problem(), remedy))
 }
 
 /// The note on the speeds that friction is told from.
@@ -249,8 +249,8 @@ pub(super) fn told_from(declared: &Declared, [low, high]: [f64; 2]) -> HealthFin
     let problem = format!(
         "friction is told from speeds of {low:.2} to {high:.2} {unit}: slower or faster it is a guess"
     );
-    let mend = "nothing has to be done; the refined model says so where a log goes beyond them";
-    finding(Severity::Info, declared.names().position, problem, mend)
+    let remedy = "nothing has to be done; the refined model says so where a log goes beyond them";
+    finding(Severity::Info, declared.names().position, problem, remedy)
 }
 
 /// Whether a factor is that of a unit.
@@ -270,11 +270,11 @@ fn before_a_gear(rows: &Rows, declared: &Declared) -> Option<HealthFinding> {
          cannot be the one that acts on the axis",
         names.position, names.speed
     );
-    let mend = format!(
+    let remedy = format!(
         "read both with the gear's ratio: --map {0}={0}*{ratio:.3} and the same of the speed",
         names.effort
     );
-    Some(finding(Severity::Error, names.effort, problem, mend))
+    Some(finding(Severity::Error, names.effort, problem, remedy))
 }
 
 /// Whether the position is in the unit that its column says: nothing else makes an inertia so many times as large.
@@ -313,8 +313,8 @@ pub(super) fn check_unit(
          times off",
         (inertia / declared.inertia).max(declared.inertia / inertia)
     );
-    let mend = format!("read it with --map {name}={name}*{:.6}", 1.0 / factor);
-    Some(finding(Severity::Error, name, problem, mend))
+    let remedy = format!("read it with --map {name}={name}*{:.6}", 1.0 / factor);
+    Some(finding(Severity::Error, name, problem, remedy))
 }
 
 /// Whether the measured effort can be what the declared model says it is.
@@ -371,8 +371,8 @@ pub(super) fn check_effort(
     }
     if factor < 0.0 {
         let problem = "the effort acts against what the declared model wants: its sign is turned".to_owned();
-        let mend = format!("turn the sign with --map {effort}={effort}*-1");
-        return vec![finding(Severity::Error, effort, problem, mend)];
+        let remedy = format!("turn the sign with --map {effort}={effort}*-1");
+        return vec![finding(Severity::Error, effort, problem, remedy)];
     }
     if (RIGHT_UNIT[0]..=RIGHT_UNIT[1]).contains(&factor) {
         return Vec::new();
@@ -386,7 +386,7 @@ pub(super) fn check_effort(
     let problem = format!(
         "the effort is {factor:.3} times what the declared model wants, so it cannot be the one that acts on the axis: {cause}"
     );
-    let mend =
+    let remedy =
         format!("read it with --map {effort}={effort}*{:.4}, or with the gear's own ratio", 1.0 / factor);
-    vec![finding(Severity::Error, effort, problem, mend)]
+    vec![finding(Severity::Error, effort, problem, remedy)]
 }

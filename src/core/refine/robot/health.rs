@@ -59,13 +59,14 @@ pub(super) fn inseparable() -> HealthFinding {
     )
 }
 
-fn finding(severity: Severity, column: &str, problem: String, mend: &str) -> HealthFinding {
-    HealthFinding::new(severity, column, problem, mend)
+fn finding(severity: Severity, column: &str, problem: String, remedy: &str) -> HealthFinding {
+    HealthFinding::new(severity, column, problem, remedy)
 }
 
 fn of_log(log: &Log, readings: &Readings, robot: &RobotModel) -> Vec<HealthFinding> {
     let mut found = Vec::new();
-    let error = |column: &str, problem: String, mend: &str| finding(Severity::Error, column, problem, mend);
+    let error =
+        |column: &str, problem: String, remedy: &str| finding(Severity::Error, column, problem, remedy);
     let seconds = readings.rows() as f64 * readings.dt_s;
     if seconds < SHORTEST_S {
         found.push(error(
@@ -122,16 +123,16 @@ fn compared(column: &str, (slope, correlation): (f64, f64), of: &str) -> Option<
     } else if correlation.abs() < 0.5 {
         let problem =
             format!("does not follow {of} (correlation {correlation:.2}): a dead or mistaken sensor");
-        let mend = "check both sensors and their columns, and record anew";
-        return Some(finding(Severity::Error, column, problem, mend));
+        let remedy = "check both sensors and their columns, and record anew";
+        return Some(finding(Severity::Error, column, problem, remedy));
     } else if slope.abs() > 1.33 || slope.abs() / correlation.powi(2) < 0.75 {
         // Noise of the other column flattens the slope, by no more than the correlation says.
         format!("is {slope:.3} times what {of} says: its unit is wrong")
     } else {
         return None;
     };
-    let mend = "map the column with the right factor, --map COLUMN=COLUMN*FACTOR";
-    Some(finding(Severity::Error, column, problem, mend))
+    let remedy = "map the column with the right factor, --map COLUMN=COLUMN*FACTOR";
+    Some(finding(Severity::Error, column, problem, remedy))
 }
 
 /// A way that the declared wheels cannot have rolled; `rolled` is what they say.
@@ -145,12 +146,12 @@ fn other_wheels(way: &[f64], rolled: &[f64], radius_m: f64) -> Option<HealthFind
         "is {slope:.3} times what wheel_radius_m = {radius_m} of the model makes of the motors' angles and the pitch: \
          the log is of other wheels"
     );
-    let mend = format!(
+    let remedy = format!(
         "put wheel_radius_m = {:.4} into the model, or map the column, --map x_m=x_m*{:.4}",
         slope * radius_m,
         1.0 / slope
     );
-    Some(finding(Severity::Error, "x_m", problem, &mend))
+    Some(finding(Severity::Error, "x_m", problem, &remedy))
 }
 
 fn of_signals(log: &Log, readings: &Readings, robot: &RobotModel) -> Vec<HealthFinding> {
@@ -161,8 +162,8 @@ fn of_signals(log: &Log, readings: &Readings, robot: &RobotModel) -> Vec<HealthF
     let moved = changes(&readings.angle_rad[0], lag);
     if is_still(readings) {
         let problem = "the robot hardly moves, so that few effects can be identified".to_owned();
-        let mend = "drive back and forth, with a multisine of torque on top, to have more of it identified";
-        found.push(finding(Severity::Warning, "motor_angle_left_rad", problem, mend));
+        let remedy = "drive back and forth, with a multisine of torque on top, to have more of it identified";
+        found.push(finding(Severity::Warning, "motor_angle_left_rad", problem, remedy));
         return found;
     }
     let turned = relation(&pitch, &sums(&readings.rate_rad_s, lag, dt_s));
@@ -254,8 +255,8 @@ fn died(readings: &Readings) -> Option<HealthFinding> {
             "stays the same for {seconds:.1} s from {start_s:.1} s on while the other {other} goes on: the sensor is dead \
              there"
         );
-        let mend = "check the sensor and its cable, or cut the log to the part before";
-        finding(Severity::Error, name, problem, mend)
+        let remedy = "check the sensor and its cable, or cut the log to the part before";
+        finding(Severity::Error, name, problem, remedy)
     };
     let of = |motor: usize| {
         let side = ["left", "right"][motor];
@@ -281,9 +282,9 @@ fn one_torque_off(readings: &Readings) -> Option<HealthFinding> {
     } else {
         return None;
     };
-    let mend = "map the one that is off, --map torque_left_nm=torque_left_nm*FACTOR \
+    let remedy = "map the one that is off, --map torque_left_nm=torque_left_nm*FACTOR \
                 or --map torque_right_nm=torque_right_nm*FACTOR";
-    Some(finding(Severity::Error, "torque_right_nm", problem, mend))
+    Some(finding(Severity::Error, "torque_right_nm", problem, remedy))
 }
 
 /// Wheels of which each follows the other one's torque. A turn of the robot tells: what one torque is more than the other
@@ -320,9 +321,9 @@ fn crosswise(readings: &Readings) -> Option<HealthFinding> {
         "turns the right wheel, and the right motor's torque the left one (correlation {correlation:.2}): left and right of \
          the torques or of the wheels' sensors are swapped"
     );
-    let mend =
+    let remedy =
         "map them crosswise, --map torque_left_nm=torque_right_nm --map torque_right_nm=torque_left_nm";
-    Some(finding(Severity::Error, "torque_left_nm", problem, mend))
+    Some(finding(Severity::Error, "torque_left_nm", problem, remedy))
 }
 
 /// Whether a robot stands: one that only hunts about its place, among friction that sticks.
@@ -362,8 +363,9 @@ pub(super) fn check_motion(trace: &Trace<'_>) -> Vec<HealthFinding> {
         // Torques that are turned round turn the robot the other way too.
         return trace.readings().find_map(crosswise).into_iter().collect();
     };
-    let mend = "map the column with the right factor, --map torque_left_nm=COLUMN*FACTOR, or mend the model";
-    vec![finding(Severity::Error, "torque_left_nm", problem, mend)]
+    let remedy =
+        "map the column with the right factor, --map torque_left_nm=COLUMN*FACTOR, or correct the model";
+    vec![finding(Severity::Error, "torque_left_nm", problem, remedy)]
 }
 
 #[cfg(test)]

@@ -312,7 +312,7 @@ impl<'a> Way<'a> {
                 let next = way.rate[(row + 1).min(rows - 1)];
                 sum += 0.5 * dt * (way.rate[row] + next);
             }
-            // The integral of the rate drifts slowly, and readings of the pitch are noisy each by itself.
+            // The integral of the rate drifts slowly, and readings of the pitch have independent noise.
             way.pitch = bent(&free_pitch, &smooth::random_walk(&errors(&free_pitch, &said_pitch)));
         }
         way

@@ -1,4 +1,4 @@
-//! The best estimate of something that wanders slowly from readings that are noisy each by itself.
+//! Optimal estimate of a random walk from readings with independent noise.
 
 /// Variance of the noise of each reading, and of the step that a random walk takes between two of them, from their
 /// differences: neighbouring ones share a reading, which makes their covariance the noise's alone.
